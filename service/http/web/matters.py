@@ -116,7 +116,7 @@ async def answered(
         asked = asked_of(view.about, params, view.offered(study), partial(view.choose, study))
         found = None
         try:
-            if asked.chosen is not None or view.about.name == "calibration":
+            if asked.ready:
                 shown = context.library, study_id, view, asked.chosen, current().choice, cases
                 found, own = await work.check(partial(seen, first=not place), *shown)
                 head = own if not place else head

@@ -49,6 +49,8 @@ from sprag.worker import models
 from sprag.worker.models.starts import motion_of
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from starlette.datastructures import QueryParams
 
     from sprag.service.http.context import Context
@@ -64,10 +66,12 @@ router = page_router()
 _MOTION: Final = CASE_VIEWS["trajectory"]
 #: Panels of a small picture.
 _FEW_PANELS: Final = 2
+#: The part that shows the motion itself in another way.
+_PHASES: Final = "phases"
 #: The views below the motion, in their order.
 PARTS: Final[dict[str, CaseView[Any, Any, Any]]] = {
     **{name: CASE_VIEWS[name] for name in ("engagements", "strobes", "section")},
-    "phases": PhasesView(),
+    _PHASES: PhasesView(),
     **{name: CASE_VIEWS[name] for name in ("branch", "diagram", "basin", "transient")},
 }
 #: The ending of a machine that has no motion of the required mean speed, for which no spec of it alone is valid.
@@ -86,15 +90,25 @@ Name = Annotated[str, Query(max_length=20)]
 def seen(
     study: Study,
     case: int,
-    view: CaseView[Any, Any, Any],
+    views: Sequence[CaseView[Any, Any, Any]],
     chosen: Any,
     start: int | None,
     rows: Any,
     reading: Reading,
     cases: str,
+) -> list[Seen]:
+    """Compute what views of a case show, draw it and say what people read of it. For a process that computes.
+
+    It is computed once: views that are opened together are of the same part of a motion.
+    """
+    answer = see(study, case, views[0], chosen, start)
+    return [_shown(view, answer, rows, reading, cases) for view in views]
+
+
+def _shown(
+    view: CaseView[Any, Any, Any], answer: CaseAnswer[Any, Any], rows: Any, reading: Reading, cases: str
 ) -> Seen:
-    """Compute the view of a case, draw it and say what people read of it. For a process that computes."""
-    answer = see(study, case, view, chosen, start)
+    study, case = answer.study, answer.case
     shown = NOTHING_MORE if view.about.name == _MOTION.about.name else view.shown(answer)
     if not view.drawn:
         return Seen(shown=shown)
@@ -122,14 +136,19 @@ async def motion_page(
         raise ApiError("not-found", "The cases of this study have no such view.")
     frame = await in_thread(study_frame, context, study_id)  # of the same moment: the views are computed meanwhile
     params, nothing = work.request.query_params, type(work.request.query_params)()
-    motion = await in_thread(_motion, study, case, nothing if show else params)
-    part = await in_thread(_asked, PARTS[show], study, case, params) if show else None
+    along = show in ("", _PHASES)  # other parts have a `from` and a `to` of their own
+    motion = await in_thread(_motion, study, case, params if along else nothing)
+    views = [_MOTION, *([PARTS[show]] if show else [])]
     status, opened = 200, []
-    for view, asked in ((_MOTION, motion), *([(PARTS[show], part)] if part else [])):
-        found, own = await _seen(work, study_id, study, case, view, asked, which, frame["reading"])
+    for together in [views] if along else [[view] for view in views]:
+        asked = motion if _MOTION in together else await in_thread(_asked, together[0], study, case, params)
+        found, own = await _seen(work, study_id, study, case, together, asked, which, frame["reading"])
         status = max(status, own)
-        opened.append((asked, found))
-    values = {"row": row, "regimes": rows if row and row.results.get("regime.number") is not None else (), "show": show}
+        opened += [(replace(asked, about=view.about), one) for view, one in zip(together, found, strict=True)]
+    values = {
+        "row": row, "regimes": rows if row and row.results.get("regime.number") is not None else (), "show": show,
+        "along": along, "part": urlencode([(one.asked.alias, one.given[-1]) for one in motion.fields if one.given]),
+    }  # fmt: skip
     return await in_thread(_page, frame, study_id, study, case, which, opened, status, values)
 
 
@@ -141,34 +160,42 @@ def _motion(study: Study, case: int, params: QueryParams) -> Asked:
     """The part of the motion that is shown: as requested, otherwise the last periods of the window."""
     asked = _asked(_MOTION, study, case, params)
     extent, window = models.extent(study, case), study.run.get("window")
+    if not asked.ready:
+        return asked
+    first, last, _points = asked.chosen
     if extent.along == "time" and not any(one.given for one in asked.fields):
         last = extent.end
         if window:
             last = min(window[1][0] * (extent.period if window[1][1] == "periods" else 1.0), extent.end)
-        return replace(asked, chosen=(max(last - _FIRST_PERIODS * extent.period, 0.0), last, _POINTS))
-    return replace(asked, chosen=(*asked.chosen[:2], _POINTS)) if asked.chosen else asked
+        first = max(last - _FIRST_PERIODS * extent.period, 0.0)
+    return replace(asked, chosen=(first, last, _POINTS), exact=_part_of(first, last))
+
+
+def _part_of(first: float, last: float) -> list[tuple[str, str]]:
+    return [("from", repr(first)), ("to", repr(last)), ("points", str(_POINTS))]
 
 
 async def _seen(
-    work: Work, study_id: str, study: Study, case: int, view: CaseView[Any, Any, Any], asked: Asked,
+    work: Work, study_id: str, study: Study, case: int, views: Sequence[CaseView[Any, Any, Any]], asked: Asked,
     which: int | None, reading: Reading,
-) -> tuple[Seen | None, int]:  # fmt: skip
-    """A view as the page shows it, and the status of the page; a sentence where it cannot be computed now.
+) -> tuple[Sequence[Seen | None], int]:  # fmt: skip
+    """Views of one part as the page shows them, and its status; a sentence where they cannot be computed now.
 
     The first one after the start waits seconds for its kernel, so the page comes without it and asks again.
     """
-    if asked.chosen is None:
-        return None, 422 if asked.faults else 200
+    if not asked.ready:
+        return [None] * len(views), 422 if asked.faults else 200
+    view = views[0]
     rows = await in_thread(view.rows, work.context.store, study_id, study, case, asked.chosen)
     if not ("wait" in work.request.query_params or all(map(work.context.computer.has_loaded, view.kernels(study)))):
-        return Seen(later=True), 200
+        return [Seen(later=True)] * len(views), 200
     try:
         for kernel in view.kernels(study):
             await work.load(kernel)
         start = which if view.about.starts else None
-        return await work.compute(seen, study, case, view, asked.chosen, start, rows, reading, cases_of(study_id)), 200
+        return await work.compute(seen, study, case, views, asked.chosen, start, rows, reading, cases_of(study_id)), 200
     except FaultError as error:
-        return Seen(note=error.detail), api_error(error).type.status
+        return [Seen(note=error.detail)] * len(views), api_error(error).type.status
 
 
 def _page(

@@ -52,19 +52,23 @@ class Asked:
     Attributes
     ----------
     fields : those of its form
-    chosen : what the view makes of them; None where something is missing, or wrong
+    chosen : what the view makes of them
     faults : what is wrong
+    ready : whether nothing is missing or wrong
+    exact : parameters of an address in the place of those of the fields, where more is shown than was asked
     """
 
     about: ViewInfo
     fields: tuple[Field, ...]
     chosen: Any
     faults: tuple[Fault, ...] = ()
+    ready: bool = True
+    exact: Sequence[tuple[str, str]] = ()
 
     @property
     def pairs(self) -> list[tuple[str, str]]:
         """What is asked as parameters of an address."""
-        return [(one.asked.alias, text) for one in self.fields for text in one.values]
+        return [*self.exact] or [(one.asked.alias, text) for one in self.fields for text in one.values]
 
 
 class Fact(NamedTuple):
@@ -121,11 +125,12 @@ def asked_of(
     )
     texts = {one.asked.alias: one.values for one in fields}
     if any(one.default is ... and not texts.get(one.alias) for one in settings):
-        return Asked(about, fields, None)
+        return Asked(about, fields, None, ready=False)
     try:
         return Asked(about, fields, choose(question_of(about.question, texts)))
     except FaultError as error:
-        return Asked(about, fields, None, error.faults if any(one.given for one in fields) else ())
+        told = error.faults if any(one.given for one in fields) else ()
+        return Asked(about, fields, None, told, ready=False)
 
 
 def files_of(address: str, asked: Asked, further: Sequence[tuple[str, str]] = ()) -> list[tuple[str, str]]:

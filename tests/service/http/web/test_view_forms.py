@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import html
 import json
 import re
 from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qsl, urlsplit
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from sprag.service.http.web.motion import PARTS
 from sprag.service.presets import preset_text
 from sprag.service.spec.document import format_of, load_spec
 from sprag.service.storage.part import SystemClock
+from sprag.service.views import trajectory
 from sprag.service.views.case_questions import CASE_VIEWS
 from sprag.service.views.setting import settings_of
 from sprag.worker.dispatcher import Dispatcher
@@ -28,6 +31,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from sprag.service.settings import Settings
+    from sprag.worker.models import Trajectory
+    from sprag.worker.study import Study
     from tests.service.conftest import Service
 
 SETTLED: dict[str, Any] = changed(
@@ -96,6 +101,41 @@ def test_every_view_of_a_case_is_on_its_page(service: Service, model: str) -> No
         if part in {about.name for about in CASE_VIEWS}:
             assert f"/api/v1{own}/{part}?" in section
     assert service.http.get(f"{own}?show=curves").status_code == 404
+
+
+def test_a_phase_portrait_is_of_the_part_above_which_is_run_once(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = f"/studies/{study_of(service, 'drive')}/cases/1"
+    runs: list[tuple[float, float]] = []
+    run = trajectory.models.run_trajectory
+
+    def counted(study: Study, case: int, first: float, last: float, points: int) -> Trajectory:
+        runs.append((first, last))
+        return run(study, case, first, last, points)
+
+    monkeypatch.setattr(trajectory.models, "run_trajectory", counted)
+    for part in ({}, {"from": "0.1", "to": "0.3"}):
+        assert service.http.get(own, params=part).status_code == 200
+        page = service.http.get(own, params={"show": "phases", **part})
+        assert page.text.count('<section id="') == 2
+        assert len(runs) == 2
+        assert len(set(runs)) == 1, "the same part on both pages"
+        runs.clear()
+
+
+@pytest.mark.parametrize("model", HAVE)
+def test_files_of_a_motion_have_the_part_that_is_shown(service: Service, model: str) -> None:
+    own = f"/studies/{study_of(service, model)}/cases/{3 if model == 'press' else 1}"
+    section = service.http.get(own).text.partition('<section id="motion"')[2].partition("</section>")[0]
+    link = html.unescape(re.findall(r'href="([^"]*format=json[^"]*)"', section)[0])
+    asked = dict(parse_qsl(urlsplit(link).query))
+    data = service.http.get(link).json()
+    places = data.get("times", data.get("angles"))
+    assert len(places) == int(asked["points"]) > 1000
+    assert (places[0], places[-1]) == (float(asked["from"]), pytest.approx(float(asked["to"])))
+    if model == "drive":
+        assert float(asked["from"]) > 0.0, "the last periods"
 
 
 def test_old_addresses_of_views_lead_to_them_with_their_choices(service: Service) -> None:
