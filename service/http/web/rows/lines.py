@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag.service.figures.painter.elements import SMALL, text_width
+from sprag.service.figures.painter.elements import lines_of as lines_of_text
 from sprag.service.results.explore import histogram
 from sprag.worker.directions import DIRECTIONS, SWEEP
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -22,9 +24,11 @@ HEIGHT: Final = 200
 TOP: Final = 54
 BELOW: Final = 24
 _WIDTH: Final = 1040
-_STEPS: Final = (104, 240)
+_STEPS: Final = (108, 240)
 #: Pixels beside the first and the last axis, for their words.
 _EDGE: Final = 64
+#: Pixels between the names of two axes.
+_APART: Final = 8
 #: Pixels of the longest bar of a histogram beside its axis.
 _BAR: Final = 22
 #: Most lines of rows within the conditions, and of those outside.
@@ -69,6 +73,23 @@ class Lines:
     lines: tuple[tuple[int, int, str], ...]
     width: int
     left_out: int
+
+    def heads(self, names: Mapping[str, str]) -> dict[str, list[str]]:
+        """What each axis is called, in two lines of about the same length, or in as many as fit between two axes."""
+        room = self.axes[1].x - self.axes[0].x - _APART
+        heads = {}
+        for axis in self.axes:
+            name = names[axis.name]
+            two = _halves(name)
+            fit = all(text_width(line, SMALL) <= room for line in two)
+            heads[axis.name] = two if fit else lines_of_text(name, room, SMALL)
+        return heads
+
+
+def _halves(text: str) -> list[str]:
+    words = text.split()
+    pairs = [(" ".join(words[:cut]), " ".join(words[cut:])) for cut in range(1, len(words))]
+    return list(min(pairs, key=lambda pair: max(map(len, pair)))) if pairs else [text]
 
 
 def lines_of(

@@ -115,7 +115,7 @@ def _page(context: Context, study_id: str, view: RowsPage) -> Response:
         was=lambda path, value: _was(study, path, value),
         own_paths=own_paths(study),
         plot={"top": TOP, "height": HEIGHT, "bottom": TOP + HEIGHT + BELOW, "shades": range(1, SHADES + 1)},
-        halves=halves,
+        heads={} if view.lines is None else view.lines.heads({name: reading.caption(name) for name in view.shown}),
         own_endings=list(models.endings_of(study.model)),
         paths=set(study.column_paths),
         regimes=[] if (regime := models.regime_info(infos)) is None else regime.categories,
@@ -144,13 +144,6 @@ def _was(study: Study, path: str, value: object) -> float | None:
     if base is None or not isinstance(value, float) or abs(value - base) <= SAME_VALUE * abs(base):
         return None
     return base
-
-
-def halves(text: str) -> list[str]:
-    """A title in two lines of about the same length, for the head of an axis."""
-    words = text.split()
-    pairs = [(" ".join(words[:cut]), " ".join(words[cut:])) for cut in range(1, len(words))]
-    return list(min(pairs, key=lambda pair: max(map(len, pair)))) if pairs else [text]
 
 
 def _asked(context: Context, study_id: str, given: QueryParams, reading: Reading, most: int) -> ExploreQuery:

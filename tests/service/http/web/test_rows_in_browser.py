@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from typing import TYPE_CHECKING
+from urllib.parse import urlencode
 
 import pytest
 from playwright.sync_api import expect
@@ -138,3 +139,32 @@ def test_points_that_take_the_place_of_lines_are_reached_by_keys(visitor: Visito
     page.goto(f"/studies/{example}/rows")
     page.get_by_role("link", name="Points").click()
     expect(page.locator("figure.points svg.figure")).to_have_attribute("tabindex", "0")
+
+
+def test_names_of_many_axes_do_not_overlap(visitor: Visitor, example: str) -> None:
+    page = visitor.page
+    page.goto(f"/studies/{example}/rows")
+    names = page.evaluate(
+        """() => [...document.querySelectorAll("[name=show]")]
+            .sort((a, b) => b.labels[0].textContent.length - a.labels[0].textContent.length)
+            .slice(0, 12).map((box) => box.value)"""
+    )
+    page.goto(f"/studies/{example}/rows?{urlencode([('show', name) for name in names])}")
+    expect(page.locator(".lines g[data-name]")).to_have_count(len(names))
+    overlapping = page.evaluate(
+        """() => {
+            const texts = [...document.querySelectorAll(".lines g[data-name]")].flatMap((axis) =>
+                [...axis.querySelectorAll("a:first-of-type text, .soft")].map((text) => [axis, text]));
+            const boxes = texts.map(([axis, text]) => ({ axis, text: text.textContent, box: text.getBBox() }));
+            const apart = (a, b) => a.x + a.width <= b.x || b.x + b.width <= a.x || a.y + a.height <= b.y + 1
+                || b.y + b.height <= a.y + 1;
+            return boxes.flatMap((one, place) => boxes.slice(place + 1).filter((other) => !apart(one.box, other.box))
+                .map((other) => [one.text, other.text]));
+        }"""
+    )
+    assert overlapping == []
+    highest = page.evaluate(
+        """() => Math.min(...[...document.querySelectorAll(".lines text")].map((text) => text.getBBox().y))
+            - document.querySelector(".lines svg").viewBox.baseVal.y"""
+    )
+    assert highest >= -1
