@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from sprag.sentences import Amount, Name
 from sprag.service.figures.calibration import calibration_figure
+from sprag.service.languages import _
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.reader import Phrase, joined
 from sprag.service.report.drives import DrivesPart
@@ -19,8 +20,9 @@ if TYPE_CHECKING:
 def calibration_part(found: Calibration) -> DrivesPart:
     """The part about the calibration."""
     if found.answer is None:
-        return DrivesPart(None, (Phrase("The first fit has not ended yet."),))
-    return DrivesPart(calibration_figure(found), (*_values(found), *found.sentences))
+        return DrivesPart(None, "", (Phrase("The first fit has not ended yet."),))
+    caption = _("Measured points on the fitted curve, and residuals")
+    return DrivesPart(calibration_figure(found), caption, (*_values(found), *found.sentences))
 
 
 def _values(found: Calibration) -> Iterator[str]:

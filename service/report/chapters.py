@@ -42,7 +42,8 @@ if TYPE_CHECKING:
 
 Write = Callable[["Report"], Iterator[Block]]
 
-_MEASURED: Final = N_("Measured points on the fitted curve, and residuals")
+#: Digits of inputs.
+_DIGITS: Final = 8
 _ORIGINS: Final = {
     "axes": N_("varies"), "given": "", "default": N_("default"), "derived": N_("derived"),
     "fitted": N_("fitted"), "tolerance": N_("varies from drive to drive"),
@@ -157,7 +158,7 @@ def _part(report: Report, *, name: str) -> Iterator[Block]:
     part = report.calibration if name == "calibration" else report.drives
     if part is not None:
         if part.figure is not None:
-            yield image(report, part.figure, _(_MEASURED) if name == "calibration" else _("Quantiles over the drives"))
+            yield image(report, part.figure, part.caption)
         for text in part.sentences:
             yield Text(upper_first(report.reading.say(text)))
 
@@ -206,7 +207,7 @@ def _inputs(report: Report) -> Iterator[Block]:
     for item in report.inputs:
         name = read.caption(item.path) if item.unit else choice_name(item)
         origin = _(_ORIGINS.get(item.origin, item.origin))
-        rows.append((name, input_value(report, item), unit_text(read.unit(item.unit)), origin, item.path))
+        rows.append((name, _value(report, item), unit_text(read.unit(item.unit)), origin, item.path))
     rows += [(_("Run: {name}", name=lower_first(label)), value, "", _(_ORIGINS.get(item.origin, item.origin)),
               f"run.{item.path}") for label, value, item in run_settings(report.study, report.spec, read)]  # fmt: skip
     heads = (_("Parameter"), _("Value"), _("Unit"), _("Origin"), _("Name in specs"))
@@ -214,14 +215,14 @@ def _inputs(report: Report) -> Iterator[Block]:
     yield Table(heads if coded else heads[:-1], tuple(row if coded else row[:-1] for row in rows), (1,))
 
 
-def input_value(report: Report, item: Input, digits: int = 8) -> str:
+def _value(report: Report, item: Input) -> str:
     """The value of an input in its unit, that of one that varies in a word, a formula with names of quantities."""
     if item.origin == "axes":
         return _("varies")
     if item.origin == "derived":
         return in_captions(report, str(item.value))
     value = report.reading.value(in_words(item), item.unit)
-    return value if isinstance(value, str) else number(value, digits)
+    return value if isinstance(value, str) else number(value, _DIGITS)
 
 
 def _given(report: Report) -> Iterator[Block]:

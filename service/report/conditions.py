@@ -131,6 +131,4 @@ def _tolerance(report: Report, path: str) -> str:
 
 def in_captions(report: Report, text: str) -> str:
     """A formula with what parameters are called instead of their names in files."""
-    known = {item.path for item in report.inputs} | {info.name for info in report.infos}
-    every = {*known, *(re.sub(r"\.\d+", ".*", name) for name in known)}
-    return _CODE.sub(lambda name: report.reading.within(name[0]) if name[0] in every else name[0], text)
+    return _CODE.sub(lambda name: report.reading.within(name[0]) if name[0] in report.names else name[0], text)

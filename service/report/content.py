@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -187,13 +188,13 @@ class Report:
         searches = self.study.plan is not None and self.study.plan.get("kind") == GOAL
         return self.library.fronts.of(self.study_id, exact=False) if searches else None
 
-    @property
+    @cached_property
     def best(self) -> list[int]:
         """The places of the feasible designs of a search, the best first."""
         found = self.designs
         return [] if found is None else [place for place in found.order.tolist() if found.front.feasible[place]]
 
-    @property
+    @cached_property
     def meant(self) -> dict[str, float | str]:
         """The parameters that a study has found, by their paths: of the best design, or of the fit."""
         if self.designs is not None and self.best:
@@ -208,7 +209,7 @@ class Report:
         calibrates = self.study.plan is not None and self.study.plan.get("kind") == CALIBRATE
         return self.library.calibrations.of(self.study_id) if calibrates else None
 
-    @property
+    @cached_property
     def calibration(self) -> DrivesPart | None:
         """What a calibration has found; None for another study."""
         return None if self.calibrated is None else calibration_part(self.calibrated)
@@ -217,6 +218,12 @@ class Report:
     def inputs(self) -> tuple[Input, ...]:
         """Every input, defaults included."""
         return inputs(self.study, self.spec)
+
+    @cached_property
+    def names(self) -> frozenset[str]:
+        """The names of parameters and results in files, those of all parts with ``*`` too."""
+        known = {item.path for item in self.inputs} | {info.name for info in self.infos}
+        return frozenset({*known, *(re.sub(r"\.\d+", ".*", name) for name in known)})
 
     @property
     def given(self) -> dict[str, str]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from sprag.service.faults import SelectionError
 from sprag.service.figures.ribbons import ribbon_figure
+from sprag.service.languages import _
 from sprag.service.reading.reader import Phrase, joined, plural
 from sprag.service.results.defaults import drawn_results
 from sprag.service.results.tolerances.batch import Asked
@@ -28,9 +29,10 @@ _WORST: Final = 5
 
 @dataclass(frozen=True, slots=True)
 class DrivesPart:
-    """The figure of the ribbons, None where there is none, and sentences."""
+    """A figure with its caption, None where there is none, and sentences."""
 
     figure: Figure | None
+    caption: str
     sentences: tuple[str, ...]
 
 
@@ -44,11 +46,11 @@ def drives_part(study: Study, infos: Sequence[ResultInfo], fetch: Fetch) -> Driv
         wanted = first_condition(study, names[0])
         reached = yields(study, infos, [wanted], Asked(), _WORST, fetch)
     except SelectionError as error:
-        return DrivesPart(None, (Phrase("There are no ribbons here: {why}.", why=str(error)),))
+        return DrivesPart(None, "", (Phrase("There are no ribbons here: {why}.", why=str(error)),))
     sentences: list[str] = [plural("{count} drive was drawn.", "{count} drives were drawn.", study.drives)]
     for one, line in zip(drawn.lines, reached.lines, strict=True):
         at = at_line(drawn.places, line.line)
         parts = [*yield_sentences(line, reached.conditions[0].text)]
         parts += [text for name in names for text in causes_sentences(study, one.spreads[name].causes, name)]
         sentences += [joined(": ", (at, text)) if at else text for text in parts]
-    return DrivesPart(ribbon_figure(drawn), tuple(sentences))
+    return DrivesPart(ribbon_figure(drawn), _("Quantiles over the drives"), tuple(sentences))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -54,7 +55,7 @@ def sheets(report: Report) -> Iterator[Section]:
     texts = [*(report.question.text or []), "", "", ""]
     own = [Text(text, look="own", place=place) for place, text in enumerate(texts[:3])]
     yield Section("", tuple(_answer(report)), 1)
-    yield Section("", (*[*drawing_images(report)][:_DRAWINGS], own[0]), 1)
+    yield Section("", (*islice(drawing_images(report), _DRAWINGS), own[0]), 1)
     yield Section("", (*_curves(report), own[1]), 1)
     yield from conditions(report)
     yield from (_designs if report.designs else _values if report.calibrated else _along)(report)
@@ -85,12 +86,8 @@ def _curves(report: Report) -> Iterator[Block]:
     elif report.designs is not None:
         text = _("Every design of the search; grey ones are outside the limits")
         yield image(report, front_figure(report.designs), text)
-    elif report.calibration is not None and report.calibration.figure is not None:
-        figure = replace(report.calibration.figure, panels=report.calibration.figure.panels[:_PANELS])
-        yield image(report, figure, _("Measured points on the fitted curve, and residuals"))
-    elif report.drives is not None and report.drives.figure is not None:
-        panels = report.drives.figure.panels[:_PANELS]
-        yield image(report, replace(report.drives.figure, panels=panels), _("Quantiles over the drives"))
+    elif (part := report.calibration or report.drives) is not None and part.figure is not None:
+        yield image(report, replace(part.figure, panels=part.figure.panels[:_PANELS]), part.caption)
     elif report.maps:
         yield from map_images(report, report.maps[:1])
     else:

@@ -19,7 +19,7 @@ from sprag.service.http.reading import page_query
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.web.saved_views import saved_here, view_actions
-from sprag.service.http.web.templates import fragment, page
+from sprag.service.http.web.templates import fragment
 from sprag.service.http.work import Attended
 from sprag.service.languages import _, pgettext
 from sprag.service.report import Office
@@ -110,9 +110,7 @@ async def _made(making: asyncio.Future[Shown], render: Render) -> tuple[str, int
 
 def _shell(context: Context, study_id: str) -> str:
     """The page without its document."""
-    record = context.store.studies.get(study_id)
-    response = page("document.html", study=record, here_is=_HERE)
-    return bytes(response.body).decode()
+    return str(fragment("document.html", study=context.store.studies.get(study_id), here_is=_HERE))
 
 
 def _document(
