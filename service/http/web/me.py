@@ -30,10 +30,10 @@ from sprag.service.storage.people.audit import AuditPage, audit_filter
 from sprag.service.zones import is_zone, zones
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
     from datetime import datetime
 
-    from sprag.service.storage.people.people import TokenRecord
+    from sprag.service.storage.people.people import TokenRecord, UserRecord
     from sprag.service.storage.people.scopes import TokenState
 
 router = page_router()
@@ -108,23 +108,28 @@ def _fitting_units(given: Mapping[str, str]) -> str:
 
 
 def _tokens(context: Context, user: str | None) -> list[tuple[TokenRecord, TokenState]]:
-    """The tokens of a user with their states."""
-    people, now = context.store.people, context.store.clock.now()
-    owner = next((one for one in people.users() if one.name == user), None)
-    return [(token, token.state_at(now, owner)) for token in people.tokens() if user and token.owner == user]
+    """The tokens of a user with their states; none where nobody is known."""
+    if not user:
+        return []
+    every = _with_states(context, context.store.people.users())
+    return [(token, state) for token, state in every if token.owner == user]
+
+
+def _with_states(context: Context, users: Iterable[UserRecord]) -> list[tuple[TokenRecord, TokenState]]:
+    """Every token with its state."""
+    now, owners = context.store.clock.now(), {user.name: user for user in users}
+    return [(token, token.state_at(now, owners.get(token.owner or ""))) for token in context.store.people.tokens()]
 
 
 @router.get("/me/users")
 def users(context: Ctx) -> Response:
     """Every user with role, quotas and tokens."""
-    now, listed = context.store.clock.now(), context.store.people.users()
-    records = {user.name: user for user in listed}
-    tokens = [(token, token.state_at(now, records.get(token.owner or ""))) for token in context.store.people.tokens()]
+    listed = context.store.people.users()
     return page(
         "users.html",
         parts=_parts(),
         users=[user_json(context.store.people, user) for user in listed],
-        tokens=tokens,
+        tokens=_with_states(context, listed),
     )
 
 

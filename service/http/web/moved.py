@@ -7,10 +7,7 @@ from typing import Final
 from fastapi import Request
 from starlette.responses import RedirectResponse, Response
 
-from sprag.sentences import Sentence
-from sprag.service.http.problems import ApiError
 from sprag.service.http.routers import page_router
-from sprag.service.http.web.manual import PAGES
 
 router = page_router()
 
@@ -46,6 +43,4 @@ async def moved_schedule(schedule_id: str) -> Response:
 @router.get("/docs/{name}")
 async def moved_manual(name: str) -> Response:
     """A page of the manual."""
-    if name not in PAGES:
-        raise ApiError("not-found", Sentence("Unknown page; known pages: {pages}.", pages=", ".join(PAGES)))
     return RedirectResponse(f"/help/{name}", 308)

@@ -9,7 +9,6 @@ from datetime import UTC, datetime
 from functools import lru_cache
 from typing import Any, Final
 from urllib.parse import urlencode
-from zoneinfo import ZoneInfo
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, pass_context
 from jinja2.ext import Extension
@@ -30,7 +29,7 @@ from sprag.service.http.web.script_texts import translated_texts
 from sprag.service.languages import N_
 from sprag.service.reading import times
 from sprag.service.reading.faults import allowed_text, fault_text, value_text
-from sprag.service.reading.quantities import KINDS, SI, TYPED, read_units
+from sprag.service.reading.quantities import KINDS, SI, TYPED, WORKSHOP, read_units
 from sprag.service.reading.reader import CLUTCH, Reading, model_title, shown, titled, told, word
 from sprag.service.reading.wording import counted, duration, number, symbol, typed_text, unit_text
 from sprag.service.report.html import embedded, sheet_of
@@ -125,7 +124,6 @@ def _templates() -> Environment:
     environment.filters |= {
         "number": cell,
         "counted": counted,
-        "decimal": languages.decimal,
         "typed": _when_shown(typed_text),
         "unit": _when_shown(unit_text),
         "spec": spec_text,
@@ -140,7 +138,6 @@ def _templates() -> Environment:
         "warning": _warning,
         "allowed": allowed_text,
         "given": value_text,
-        "day": day,
         "model": model_title,
         "moment": moment,
         "moment_in_full": moment_in_full,
@@ -172,7 +169,6 @@ def _templates() -> Environment:
     environment.globals["reader_name"] = _reader_name
     environment.globals["explained"] = explained
     environment.globals["clutch_reading"] = CLUTCH
-    environment.globals["administers"] = _administers
     return environment
 
 
@@ -213,13 +209,13 @@ def _units_back() -> str:
 
 
 def _units_shown() -> str:
-    """The units of the page in a few words: ``rpm · mm · deg · %``."""
+    """The units of the page in a few words: ``rpm · mm · N·m · %``."""
     rest, chosen = read_units(current().choice.units)
     if rest == TYPED and not chosen:
         return languages.gettext("as typed")
     if rest == SI and not chosen:
         return "SI"
-    others = {**({} if rest == SI else _WORKSHOP), **chosen}
+    others = {**(_WORKSHOP if rest == WORKSHOP else {}), **chosen}
     units = (others.get(kind.unit, "") for kind in KINDS if kind.name in _NAMED_KINDS)
     return " · ".join(unit_text(unit) for unit in units if unit) or languages.gettext("own units")
 
@@ -234,12 +230,6 @@ def _reader_name() -> str:
     """The name of the user who asks for the page; "" for a token without one."""
     grant = current().grant
     return (grant.user or "") if grant is not None else ""
-
-
-def _administers() -> bool:
-    """Whether an administrator asks for the page."""
-    grant = current().grant
-    return grant is not None and grant.role is Role.ADMINISTRATOR
 
 
 def page(name: str, status: int = 200, **values: Any) -> Response:
@@ -280,11 +270,6 @@ def moment(given: str | datetime | None) -> Markup:
 def moment_in_full(text: str) -> str:
     """A time stamp to the second in the reader's zone, for paper."""
     return times.in_full(datetime.fromisoformat(text), current().zone)
-
-
-def day(text: str) -> str:
-    """The date of a time stamp in the reader's zone, as the language writes it."""
-    return datetime.fromisoformat(text).astimezone(ZoneInfo(current().zone)).strftime(languages.date_format())
 
 
 def time_left(seconds: Mapping[str, float]) -> str:

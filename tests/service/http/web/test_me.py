@@ -62,6 +62,28 @@ def test_old_addresses_lead_to_where_their_content_went(service: Service) -> Non
     assert service.http.get("/docs/guide", follow_redirects=False).headers["location"] == "/help/guide"
 
 
+@pytest.mark.parametrize(
+    ("units", "words"),
+    [
+        ("workshop", "rpm · mm · N·m · %"), ("workshop,N*mm", "rpm · mm · N·mm · %"),
+        ("typed,deg", "own units"), ("typed,rpm,deg", "rpm"), ("si,mm", "mm"),
+    ],
+)  # fmt: skip
+def test_the_head_names_only_units_that_the_page_has_for_sure(service: Service, units: str, words: str) -> None:
+    page = service.http.get("/", params={"units": units}).text
+    assert f'title="Units of this page; change them">{words}</a>' in page
+
+
+def test_who_is_not_known_has_no_tokens_that_are_looked_for(service: Service, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_people: object) -> None:
+        raise AssertionError("read for nobody")
+
+    assert service.http.get("/me").status_code == 200  # whether tokens are needed is read once
+    for read in ("tokens", "users"):
+        monkeypatch.setattr(type(service.store.people), read, refuse)
+    assert service.http.get("/me").status_code == 200
+
+
 def test_a_schedule_is_made_of_days_and_a_time(service: Service) -> None:
     form = {"source": "preset one_pendulum", "when": "days", "days": "1-5", "clock": "21:05", "zone": "Europe/Kyiv"}
     assert service.http.post("/nights/new", data=form).status_code == 303
