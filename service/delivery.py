@@ -48,6 +48,7 @@ class Delivery:
     origins : origins that webhooks may have, such as ``https://example.com:443``
     secret : key of their signatures
     language : of mails
+    units : of the pictures in them, as `sprag.service.reading.quantities.read_units` takes them
     """
 
     public_url: str = "http://127.0.0.1:8000"
@@ -57,6 +58,7 @@ class Delivery:
     origins: tuple[str, ...] = ()
     secret: bytes | None = field(default=None, repr=False)
     language: str = ENGLISH
+    units: str = "workshop"
 
     @property
     def wanted(self) -> bool:

@@ -9,7 +9,7 @@ import os
 import re
 import tomllib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from ipaddress import IPv4Network, IPv6Network
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -200,8 +200,8 @@ class Settings(DeliverySettings):
     )
     units: str = Field(
         default="workshop",
-        description="units of pages and documents until somebody chooses others: `workshop` (rpm, mm, deg, %), `typed` "
-        "(those of each study), `si`, or a list such as `workshop,N*mm`",
+        description="units of mails, and of pages and documents until somebody chooses others: `workshop` (rpm, mm, "
+        "deg, %), `typed` (those of each study), `si`, or a list such as `workshop,N*mm`",
     )
 
     @classmethod
@@ -307,7 +307,7 @@ class Settings(DeliverySettings):
     @property
     def reports(self) -> Delivery:
         """How reports leave the service; without a public address their links have the host and port of it."""
-        return self.delivery(self.address(self.port), self.url_prefix)
+        return replace(self.delivery(self.address(self.port), self.url_prefix), units=self.units)
 
     def require_safe(self, *, stored: bool = False) -> None:
         """Raise `UnsafeSettingsError` when another machine could reach the service and there is no token

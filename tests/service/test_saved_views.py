@@ -142,7 +142,7 @@ def test_the_report_has_the_chosen_figures_in_order(service: Service, study: str
     assert report(service, study, y="efficiency").count("Torque of the clutch") == 0  # curves of an address win
     pdf = service.http.get(f"{API}/studies/{study}/report?format=pdf")
     assert pdf.content.startswith(b"%PDF")
-    assert small_curve(service.store, study) == found.figures[0].draw("png", "Torque of the clutch")
+    assert small_curve(service.store, study, "workshop") == found.figures[0].draw("png", "Torque of the clutch")
 
 
 def test_a_figure_that_cannot_be_drawn_says_so(service: Service, study: str) -> None:

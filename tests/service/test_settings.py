@@ -34,6 +34,7 @@ def test_defaults_keep_to_this_machine(settings: Settings) -> None:
     assert plain.database_url == f"sqlite:///{default_database_path()}"
     assert plain.pool_processes == available_cores() >= 1
     assert Settings(processes=3).pool_processes == 3
+    assert Settings(units="si").reports.units == "si"
     assert Settings(database="sqlite:////x/y.db").database_url == "sqlite:////x/y.db"
     plain.require_safe()
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from sprag.service.figures.pictures import draw_curves
-from sprag.service.reading.quantities import TYPED
 from sprag.service.reading.reader import Choice, reading_for
 from sprag.service.report.chosen_figures import chosen_figures
 from sprag.service.results.curve_cases import draw, select
@@ -17,17 +16,15 @@ from sprag.worker import models
 if TYPE_CHECKING:
     from sprag.service.storage.store import Store
 
-_AS_TYPED: Final = Choice(TYPED)
 
-
-def small_curve(store: Store, study_id: str) -> bytes | None:
+def small_curve(store: Store, study_id: str, units: str) -> bytes | None:
     """The figure or the curve as PNG; None for a study whose cases lie on no curves.
 
     Raises StudyNotFoundError, and SelectionError for curves that cannot be drawn.
     """
-    study = store.studies.study(study_id)
+    study, choice = store.studies.study(study_id), Choice(units)
     infos = models.study_results(study)
-    chosen = next((figure for figure in chosen_figures(store, study_id, _AS_TYPED) if figure.shown is not None), None)
+    chosen = next((figure for figure in chosen_figures(store, study_id, choice) if figure.shown is not None), None)
     if chosen is not None:
         return chosen.draw("png", chosen.name)
     query = main_query(study, infos)
@@ -35,4 +32,4 @@ def small_curve(store: Store, study_id: str) -> bytes | None:
         return None
     fetch = partial(store.rows.for_cases, study_id)
     drawn = draw(select(study, infos, replace(query, y=query.y[:1])), fetch)
-    return draw_curves(drawn, "", "png", reading_for(study, store.studies.spec(study_id), _AS_TYPED))
+    return draw_curves(drawn, "", "png", reading_for(study, store.studies.spec(study_id), choice))

@@ -88,7 +88,7 @@ class Reporter(PollingThread):
 
         try:
             with language(self._delivery.language):
-                return small_curve(self._store, study)
+                return small_curve(self._store, study, self._delivery.units)
         except Exception as error:  # a report without its picture is better than none
             _LOG.warning("The report %s has no curve: %s", report.id, error)
             return None

@@ -20,6 +20,7 @@ import pytest
 from sprag.service.delivery import Delivery, MailServer, Security
 from sprag.service.jobs.reports import channels
 from sprag.service.jobs.reports.channels import signature
+from sprag.service.jobs.reports.curve import small_curve
 from sprag.service.jobs.reports.message import mail, subject
 from sprag.service.jobs.reports.reporter import Reporter
 from sprag.service.jobs.scheduler import Scheduler
@@ -104,6 +105,9 @@ def test_a_mail_has_the_outcome_a_curve_and_links(
     (picture,) = [part for part in mail.walk() if part.get_content_type() == "image/png"]
     assert picture["Content-ID"] == "<curve>"
     assert picture.get_content().startswith(b"\x89PNG")
+    # It is in the units of the office.
+    assert picture.get_content() == small_curve(service.store, study, "workshop")
+    assert picture.get_content() != small_curve(service.store, study, "typed")
     sent = records(service.store)
     assert {(report.target, report.state, report.attempts) for report in sent} == {
         (DORA, ReportState.SENT, 1),

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from sprag.service.jobs.reports.curve import small_curve
 from sprag.service.jobs.scheduler import Scheduler
+from sprag.service.reading.quantities import TYPED
 from sprag.service.report.document import report_of
 from sprag.service.schedules.fields import read_fields
 from sprag.service.spec.saved_views import View
@@ -33,7 +34,7 @@ def test_the_next_study_of_a_schedule_has_the_figures_of_the_one_before(service:
     for study in studies[1:]:
         assert [(one.view.name, one.place) for one in service.store.views.all(study)] == [("Efficiency", 1)]
         (figure,) = report_of(Library(service.store), study).figures
-        assert small_curve(service.store, study) == figure.draw("png", "Efficiency")
+        assert small_curve(service.store, study, TYPED) == figure.draw("png", "Efficiency")
     (first, *_) = service.store.views.all(studies[1])
     service.store.views.remove(first.id)
     Scheduler(service.store).look()  # what was taken out stays out
