@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 EXAMPLES = Path(__file__).parents[3] / "examples"
 
 
-def got(service: Service, spec: dict[str, Any], form: str) -> bytes:
+def got(service: Service, spec: dict[str, Any], form: str, **asked: str) -> bytes:
     """The bytes of a study's rows, or of its report, in a format."""
     study_id = service.submit(spec)
     where = "report" if form in {"html", "pdf"} else "results"
-    response = service.http.get(f"/api/v1/studies/{study_id}/{where}", params={"format": form})
+    response = service.http.get(f"/api/v1/studies/{study_id}/{where}", params={"format": form, **asked})
     assert response.status_code == 200, response.text
     return response.content
 
@@ -125,7 +125,7 @@ def test_a_fitted_clutch_is_told_from_a_given_one_and_the_run_has_its_defaults(s
     assert origins["pendulums.0.clutch.through_origin"] == ("true", "default")
     assert origins["window"] == ("the last third", "default")
     assert origins["tolerance"] == ("1e-09", "default")
-    page = got(service, spec, "html").decode()
+    page = got(service, spec, "html", appendix="inputs", names="codes").decode()
     assert re.search(r"<td[^>]*>9.80665</td><td>m/s²</td><td>default</td><td>gravity</td>", page)
     window = r'<th scope="row">Run: evaluated window</th><td[^>]*>the last third</td><td></td><td>default</td>'
     assert re.search(window, page)
