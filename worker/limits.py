@@ -110,8 +110,8 @@ MAX_STREAMS: Final = 200
 MAX_STREAMS_EACH: Final = 100
 #: Simultaneous connections; a further one is answered with 503.
 MAX_CONNECTIONS: Final = 800
-#: Size of the head of a request, which the parser of HTTP would limit to 16 KiB, and of the address in it: the address
-#: of a laboratory describes a machine, and those that it is compared with.
+#: Size of the head of a request, which the parser of HTTP would limit to 16 KiB, and of the address in it: that of a
+#: new study can describe its machine.
 MAX_HEAD_BYTES: Final = 64 * 1024
 MAX_ADDRESS_BYTES: Final = 56 * 1024
 #: Seconds within which the head of a request, and then its body, must arrive.

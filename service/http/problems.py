@@ -51,7 +51,7 @@ PROBLEM_TYPES: dict[Kind, ProblemType] = _catalogue(
     _P("component-not-found", 404, "Component not found", "It never existed or was deleted."),
     _P("view-not-found", 404, "Saved view not found", "It never existed, or was deleted itself or with its study."),
     _P("case-not-found", 404, "Case not found", "Cases are numbered from 0."),
-    _P("not-found", 404, "There is nothing at this address", "The addresses of the interface are listed at /docs."),
+    _P("not-found", 404, "There is nothing at this address", "The addresses of the interface are at /help/interface."),
     _P(
         "method-not-allowed", 405, "This address does not support this method", "The header Allow lists those it takes."
     ),

@@ -134,7 +134,8 @@ class Presentation:
     symbols : symbol of the catalogue -> base and index as in print
     captions : what people read instead of a name of the catalogue, with N and K for indices; ``{}`` is the last index
     letters : base and index, as in print, of results
-    form, laboratory : its machine as fields of a form, and with sliders
+    form : its machine as fields of a form
+    laboratory : what its machine answers while it is drawn
     theory : beginning of paths without indices -> page of docs/ and heading that explain it, as in a URL
     """
 

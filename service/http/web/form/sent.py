@@ -111,7 +111,7 @@ def _vary(values: Values, name: str, path: str, *, wanted: bool) -> None:
 
 
 def ends_of(values: Mapping[str, str], path: str) -> tuple[str, str] | None:
-    """Ends proposed for a number: around its value, as far as its slider would go; None where it is 0 or unknown."""
+    """Ends proposed for a number: its value times the factors of its kind; None where it is 0 or unknown."""
     text = values.get(f"{BASE}/{path.replace('.', '/')}", "").strip()
     try:
         number, unit = split_quantity(text)
