@@ -111,11 +111,6 @@ def file_pairs() -> list[tuple[str, str]]:
     return [*address_pairs(current().choice), *language_pairs()]
 
 
-def read_as() -> str:
-    """The choice of the page that is made, as the rest of an address of a figure that has a query already."""
-    return f"&{urlencode(address_pairs(current().choice))}"
-
-
 def file_read_as() -> str:
     """`file_pairs` as the rest of an address of a file that has a query already."""
     return f"&{urlencode(file_pairs())}"

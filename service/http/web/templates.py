@@ -22,8 +22,8 @@ from sprag.service.actor import Role
 from sprag.service.figures.drawing import Drawing
 from sprag.service.figures.drawing import svg as drawing_svg
 from sprag.service.http.current import current
-from sprag.service.http.language import language_pairs
 from sprag.service.http.prefix import here
+from sprag.service.http.reading import file_read_as
 from sprag.service.http.web.explained import explained
 from sprag.service.http.web.script_texts import translated_texts
 from sprag.service.languages import N_
@@ -154,7 +154,7 @@ def _templates() -> Environment:
     environment.globals["prefix_of_urls"] = lambda: current().prefix
     environment.globals["language"] = languages.current
     environment.globals["languages"] = languages.titles
-    environment.globals["in_language"] = _in_language
+    environment.globals["file_read_as"] = file_read_as
     environment.globals["script_texts"] = translated_texts
     environment.globals["page_address"] = lambda: current().page
     environment.globals["read_only"] = _read_only
@@ -170,11 +170,6 @@ def _templates() -> Environment:
     environment.globals["explained"] = explained
     environment.globals["clutch_reading"] = CLUTCH
     return environment
-
-
-def _in_language() -> str:
-    """The language of the page as the rest of the address of a file that has a query already."""
-    return "".join(f"&{urlencode([pair])}" for pair in language_pairs())
 
 
 def cell(value: float | str | None, digits: int = 5) -> str:

@@ -196,7 +196,9 @@ def test_the_last_night_has_trouble_first(service: Service, clock: Clock) -> Non
     assert "&lt;b&gt;odd&lt;/b&gt;" in page
     assert "2026-01-01 01:00</time>" in page
     assert "1 run of 2 needs attention" in page
-    assert f"/api/v1/studies/{study}/curves?format=svg" in page
+    assert f"/api/v1/studies/{study}/curves?format=svg&amp;units=workshop" in page
+    ukrainian = service.http.get("/nights", params={"units": "si,rpm", "language": "uk"}).text
+    assert f"/api/v1/studies/{study}/curves?format=svg&amp;units=si%2Crpm&amp;language=uk" in ukrainian
     clock.set("2026-01-01T05:00")
     assert [run["name"] for run in service.get("/night", hours=3)["runs"]] == ["late"]
     for wrong in ("0", "745", "x", "nan"):
