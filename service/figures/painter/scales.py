@@ -76,8 +76,8 @@ class Scale:
         low, high = min(self.low, self.high), max(self.low, self.high)
         if not high > low:
             return [low]
-        if self.log:
-            return _decades(low, high, wanted)
+        if self.log and len(found := _decades(low, high, wanted)) > 1:
+            return found
         step = step_of(low, high, wanted, self.unit)
         places = range(math.ceil(low / step - 1e-6), math.floor(high / step + 1e-6) + 1)
         return [round(place * step, 12 - math.floor(math.log10(step))) for place in places]
@@ -103,12 +103,12 @@ def step_of(low: float, high: float, wanted: int, unit: str = "1") -> float:
 
 
 def _decades(low: float, high: float, wanted: int) -> list[float]:
-    """Powers of ten; numbers between them where there are few."""
+    """Powers of ten; numbers between them where there are few, of a part of a decade perhaps none."""
     first, last = math.floor(math.log10(low) + 1e-9), math.ceil(math.log10(high) - 1e-9)
     factors = (1.0,) if last - first > wanted / 2 else (1.0, 2.0, 5.0)
     every = max((last - first) // max(wanted, 1), 1) if factors == (1.0,) else 1
     found = [factor * 10.0**power for power in range(first, last + 1, every) for factor in factors]
-    return [one for one in found if 0.999999 * low <= one <= 1.000001 * high] or [low, high]
+    return [one for one in found if 0.999999 * low <= one <= 1.000001 * high]
 
 
 def tick_text(value: float) -> str:

@@ -12,7 +12,7 @@ import pytest
 
 from sprag.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity, line_colours
 from sprag.service.figures.painter.elements import SMALL, lines_of, text_width
-from sprag.service.figures.painter.scales import Scale, rounded_scale
+from sprag.service.figures.painter.scales import Scale, rounded_scale, tick_text
 from sprag.service.figures.svg import picture_svg, spark, svg
 
 X = np.linspace(0.0, 1.6, 9)
@@ -126,3 +126,11 @@ def test_degrees_are_parts_of_a_turn() -> None:
 def test_a_text_breaks_between_words() -> None:
     assert lines_of("one two three", text_width("one two ")) == ["one two", "three"]
     assert lines_of("", 10.0) == []
+
+
+@pytest.mark.parametrize(("low", "high"), [(20.223, 34.995), (1.1, 1.9), (6.0, 19.0), (3.0, 3000.0)])
+def test_a_logarithmic_axis_has_round_numbers_within_a_decade_too(low: float, high: float) -> None:
+    scale = Scale(low, high, 0.0, 800.0, log=True)
+    for ticks in (scale.ticks(), scale.rising()):
+        assert len(ticks) > 2
+        assert all(low <= one <= high and len(tick_text(one).replace("\u202f", "")) <= 4 for one in ticks)
