@@ -122,6 +122,7 @@ def _page(context: Context, study_id: str, view: RowsPage) -> Response:
         flags=meanings(models.flags_of(study.model)),
         beside=rows,
         missing=missing,
+        same=SAME_VALUE,
         beside_lines=lines_of(study, rows),
         most_in_file=MAX_SELECTED,
         most_points=MOST_POINTS,

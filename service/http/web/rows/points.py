@@ -28,7 +28,8 @@ def points_of(
     found: Explored, asked: Asked, shades: NDArray[np.int64], chosen: int | None, reading: Reading
 ) -> tuple[tuple[str, str], str]:
     """The two quantities, and their picture; ``chosen`` is the number of the row that stands out."""
-    pair = chosen_pair(found, asked.x, asked.y)
+    names = found.plan.shown  # of which the first follows from the others
+    pair = chosen_pair(found, asked.x or names[-1], asked.y or names[0])
     xs, ys = (found.values[name] for name in pair)
     inside = np.where(found.selected, shades, 0)
     kinds = [(inside == shade, f"var(--q{shade})", Phrase("row")) for shade in range(1, SHADES + 1)]

@@ -342,3 +342,23 @@ def test_many_rows_are_read_by_another_process(filled: tuple[Service, str], monk
     made = rows_view(*service.checker.calls[0][1:])
     assert pickle.loads(pickle.dumps(made)) == made
     assert isinstance(service.checker.calls[0][-1], Choice)
+
+
+def test_numbers_that_differ_by_rounding_are_the_same(
+    filled: tuple[Service, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    service, study_id = filled
+    values = [0.3, 0.3 * (1.0 + 1e-12), 0.303]
+    monkeypatch.setattr(pages, "lines_of", lambda _study, _rows: [("torque.mean", "N*m", values)])
+    text = read(service, f"/studies/{study_id}/rows?case=3&case=7&case=8")
+    assert re.findall(r'<br><span class="soft">([^<]*)</span>', text) == ["the same", "+1 %"]
+
+
+def test_points_have_what_rows_are_sorted_by_upwards(filled: tuple[Service, str]) -> None:
+    service, study_id = filled
+    text = read(service, f"/studies/{study_id}/rows?plot=points&show=shaft.speed.mean&show=shaft.load")
+    chosen = {
+        name: re.findall(r'<option value="([^"]*)" selected', part)
+        for name, part in re.findall(r'<select name="([xy])">(.*?)</select>', text)
+    }
+    assert chosen == {"x": ["shaft.load"], "y": ["shaft.speed.mean"]}

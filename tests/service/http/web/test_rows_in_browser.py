@@ -168,3 +168,12 @@ def test_names_of_many_axes_do_not_overlap(visitor: Visitor, example: str) -> No
             - document.querySelector(".lines svg").viewBox.baseVal.y"""
     )
     assert highest >= -1
+
+
+@pytest.mark.parametrize("visitor", [{"viewport": {"width": 390, "height": 800}}], indirect=True)
+def test_rows_beside_each_other_have_room_for_numbers_on_a_phone(visitor: Visitor, example: str) -> None:
+    page = visitor.page
+    page.goto(f"/studies/{example}/rows?case=1&case=2")
+    first = page.locator("table.beside tbody th").first.bounding_box()
+    assert first is not None
+    assert first["width"] < 390 / 2
