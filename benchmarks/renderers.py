@@ -59,7 +59,7 @@ def figures() -> Iterator[tuple[str, Figure]]:
 
 def vega_lite(figure: Figure) -> dict[str, Any]:
     """The same panels and lines in Vega-Lite's grammar."""
-    made = []
+    views = []
     for panel in figure.panels:
         rows = [
             {"x": x, "y": y, "line": line.name, "case": case}
@@ -80,19 +80,19 @@ def vega_lite(figure: Figure) -> dict[str, Any]:
             "color": {"field": "line", "type": "nominal"},
             "tooltip": [{"field": name} for name in ("x", "y", "case")],
         }
-        made.append({"data": {"values": rows}, "mark": mark, "encoding": encoding, "width": 500, "height": 300})
-    return {"$schema": "https://vega.github.io/schema/vega-lite/v6.json", "concat": made, "columns": figure.columns}
+        views.append({"data": {"values": rows}, "mark": mark, "encoding": encoding, "width": 500, "height": 300})
+    return {"$schema": "https://vega.github.io/schema/vega-lite/v6.json", "concat": views, "columns": figure.columns}
 
 
 def least(make: Callable[[], str | bytes], repeats: int) -> tuple[float, bytes]:
     """The least time of some calls, and what they make."""
-    times, made = [], b""
+    times, picture = [], b""
     for _ in range(repeats):
         begin = time.perf_counter()
-        found = make()
+        drawn = make()
         times.append(time.perf_counter() - begin)
-        made = found.encode() if isinstance(found, str) else found
-    return min(times), made
+        picture = drawn.encode() if isinstance(drawn, str) else drawn
+    return min(times), picture
 
 
 def main() -> None:
@@ -115,9 +115,9 @@ def main() -> None:
             ways["Vega-Lite for the browser"] = lambda figure=figure: json.dumps(vega_lite(figure))
             ways["Vega-Lite's SVG"] = lambda figure=figure: str(vl_convert.vegalite_to_svg(vega_lite(figure)))
         for way, make in ways.items():
-            seconds, made = least(make, options.repeats)
-            packed = len(gzip.compress(made)) / 1e3
-            print(f"{name:24} {way:26} {len(made) / 1e3:9.1f} kB {packed:8.1f} kB compressed {1e3 * seconds:8.1f} ms")
+            seconds, drawn = least(make, options.repeats)
+            packed = len(gzip.compress(drawn)) / 1e3
+            print(f"{name:24} {way:26} {len(drawn) / 1e3:9.1f} kB {packed:8.1f} kB compressed {1e3 * seconds:8.1f} ms")
 
 
 if __name__ == "__main__":
