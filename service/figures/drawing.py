@@ -65,17 +65,22 @@ class Drawing:
         return replace(self, dimensions=own)
 
 
-def svg(drawing: Drawing, labels: Mapping[str, str] | None = None, *, alone: bool = False) -> str:
+def svg(
+    drawing: Drawing, labels: Mapping[str, str] | None = None, links: Mapping[str, str] | None = None, *,
+    alone: bool = False,
+) -> str:  # fmt: skip
     """The drawing with a letter at each dimension, or with a label beside it where ``labels`` has one for its path.
 
-    ``alone`` gives it the name space and the colours that it has as a file.
+    ``links`` has addresses of labels by their paths. ``alone`` gives it the name space and the colours that it has as
+    a file.
     """
     beside = 0.0 if labels is None else max([_LABEL, *(_room(each, labels) for each in drawing.dimensions)])
-    text = _letters(drawing) if labels is None else _beside(drawing, labels)
+    text = _letters(drawing) if labels is None else _beside(drawing, labels, links or {})
     space = ' xmlns="http://www.w3.org/2000/svg"' if alone else ""
+    role = "group" if links else "img"
     frames = f' data-frames="{escape(drawing.frames)}"' if drawing.frames and not alone else ""
     return (
-        f'<svg{space} width="{drawing.width + 2 * beside:g}" height="{drawing.height:g}" class="drawing" role="img" '
+        f'<svg{space} width="{drawing.width + 2 * beside:g}" height="{drawing.height:g}" class="drawing" role="{role}" '
         f'aria-label="{escape(drawing.about)}"{frames} '
         f'viewBox="{-beside:g} 0 {drawing.width + 2 * beside:g} {drawing.height:g}">'
         f"{_COLOURS if alone else ''}{drawing.shapes}{text}</svg>"
@@ -136,17 +141,20 @@ def _printed(text: str, behind: str = "") -> str:
     return base + lower + (f'<tspan dy="-3">{behind}</tspan>' if lower and behind else behind)
 
 
-def _beside(drawing: Drawing, labels: Mapping[str, str]) -> str:
+def _beside(drawing: Drawing, labels: Mapping[str, str], links: Mapping[str, str]) -> str:
     found = []
     for side in ("left", "right"):
         rows = [each for each in rows_of(drawing, side) if labels.get(each.path)]
         edge, end = (-8.0, ' text-anchor="end"') if side == "left" else (drawing.width + 8.0, "")
         for each, y in zip(rows, _spread([each.y for each in rows], drawing.height), strict=True):
             symbol_ = f'<tspan class="letter">{_printed(each.symbol, " = ")}</tspan>' if each.symbol else ""
-            found.append(
-                f'<path class="leader" d="M{edge + (4 if side == "left" else -4):g} {y:g}L{each.x:g} {each.y:g}"/>'
+            text = (
                 f'<text data-mark="{escape(each.path)}" x="{edge:g}" y="{y + 4:g}"{end}>'
                 f"{symbol_}{escape(labels[each.path])}</text>"
+            )
+            found.append(
+                f'<path class="leader" d="M{edge + (4 if side == "left" else -4):g} {y:g}L{each.x:g} {each.y:g}"/>'
+                + (f'<a href="{escape(links[each.path])}">{text}</a>' if each.path in links else text)
             )
     return "".join(found)
 

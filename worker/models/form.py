@@ -6,6 +6,7 @@ choices of the spec) needs no more than its name here.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
@@ -202,6 +203,11 @@ class Form:
     def example(self, name: str) -> str:
         """An example; "" where there is none."""
         return self.examples.get(name, "")
+
+    def in_sight(self, path: str) -> bool:
+        """Whether the field of a number is always in sight."""
+        general = re.sub(r"\.\d+(?=\.|$)", ".N", path)
+        return not self.front or any(re.fullmatch(pattern, general) for pattern in self.front)
 
     @property
     def lists(self) -> tuple[Rows, ...]:

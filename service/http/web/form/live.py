@@ -22,7 +22,6 @@ from sprag.service.http.web.form.machine import choices_of, entries, form_of, mo
 from sprag.service.http.web.form.machine_spec import base_of
 from sprag.service.http.web.form.own_machine import single_machine
 from sprag.service.http.web.form.sent import ends_of, settle
-from sprag.service.http.web.form.sheet import fits
 from sprag.service.http.web.form.spec import spec_of, values_of
 from sprag.service.http.web.form.values import Form
 from sprag.service.http.web.templates import fragment
@@ -75,7 +74,7 @@ def studies_along(values: Mapping[str, str], spec: Mapping[str, Any]) -> list[tu
     for entry in entries(values):
         path = entry.name.removeprefix("/base/").replace("/", ".")
         usual = {entry.name: values.get(entry.name, "").strip() or entry.field.default}
-        ends = ends_of({**values, **usual}, path) if entry.tolerant and fits(form_of(values).front, path) else None
+        ends = ends_of({**values, **usual}, path) if entry.tolerant and form_of(values).in_sight(path) else None
         if ends is not None:
             axis = {"path": path, "linspace": [*map(plain, ends), _VALUES]}
             try:

@@ -50,7 +50,7 @@ from sprag.service.http.web.form.rows import LIMITS
 from sprag.service.http.web.form.sent import let_vary, settle
 from sprag.service.http.web.form.sheet import Sheet, sheet_of
 from sprag.service.http.web.form.spec import REFINE_DEFAULTS, is_search, values_of
-from sprag.service.http.web.form.tolerances import OWN, distributions, drive_fields, own_name, with_batch
+from sprag.service.http.web.form.tolerances import BATCH, OWN, distributions, drive_fields, own_name, with_batch
 from sprag.service.http.web.form.undo import history_of, remember, undo
 from sprag.service.http.web.form.values import Form
 from sprag.service.http.web.templates import fragment, page, spec_text
@@ -71,6 +71,8 @@ router = page_router()
 #: Beginnings of the fields of the other question, which the page keeps though it does not show them.
 _OF_AXES: Final = ("/axes/", "/refine/", "/combine", "/sample/", "/points", "/exclude/")
 _OF_SEARCH: Final = ("/goal/",)
+#: What an address can ask, with the values that it has.
+_ASKED: Final = {"asks": ("axes", "goal", "match"), BATCH: ("on", "")}
 _OF_BATCH: Final = (OWN, "/drives", "/seed", "/draws", "/correlations/")
 
 
@@ -128,7 +130,8 @@ async def new_study(
 
 
 def _set(values: Values, given: Mapping[str, str], vary: list[str], along: str | None) -> None:
-    """Put the numbers of an address into a form, by their paths, and let those vary that it names."""
+    """Put the question and the numbers of an address into a form, by their paths, and let those vary that it names."""
+    values |= {name: given[name] for name, known in _ASKED.items() if given.get(name) in known}
     known = {entry.name: entry for entry in entries(values, hidden=True)}
     for path, text in given.items():
         name = f"{BASE}/{path.replace('.', '/')}"

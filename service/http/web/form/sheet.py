@@ -165,7 +165,7 @@ def sheet_of(
     spots = {entry.name: made.spot(entry, repeated) for entry in found if entry.control == "line"}
     alone = {entry.name for block in every for own in (block, *block.within) for entry in own.entries}
     front = frozenset(
-        entry.name for entry in found if not form.front or fits(form.front, made.path(entry.name))
+        entry.name for entry in found if form.in_sight(made.path(entry.name))
         or (entry.name in alone and entry.control in _MOVED and _differs(values, begun, (entry,)))
     )  # fmt: skip
     by_path = {spot.path: spot for spot in spots.values() if spot.name in front}
@@ -201,12 +201,6 @@ def _differs(values: Mapping[str, str], begun: Values | None, entries: Iterable[
 def _all(entries: Iterable[Entry]) -> list[Entry]:
     """Entries with those of their groups."""
     return [own for entry in entries for own in (entry, *_all(inner for _, group in entry.groups for inner in group))]
-
-
-def fits(patterns: Iterable[str], path: str) -> bool:
-    """Whether a path, with letters for its numbers, is one of those of the patterns."""
-    general = re.sub(r"\.\d+(?=\.|$)", ".N", path)
-    return any(re.fullmatch(pattern, general) for pattern in patterns)
 
 
 def _same(first: str, second: str, si: str) -> bool:

@@ -37,11 +37,11 @@ _VARIANTS: Final = 5
 _DIMENSIONS: Final = 3
 #: The questions after that of the axis, and where a new study begins that asks them.
 _QUESTIONS: Final[dict[Asked, tuple[str, str, str]]] = {
-    "best": (N_("Which design is best?"), N_("Not searched yet: say what may change"), "/new?clone={id}#goal"),
+    "best": (N_("Which design is best?"), N_("Not searched yet: say what may change"), "/new?clone={id}&asks=goal"),
     "tolerances": (
         N_("What do tolerances do?"),
         N_("No batch yet: say how far drives differ"),
-        "/new?clone={id}#tolerances",
+        "/new?clone={id}&batch=on",
     ),
     "measured": (
         N_("Does it match the measurement?"),
@@ -150,7 +150,7 @@ def _along(library: Library, study_id: str, study: Study, related: Sequence[Rela
         return Question(text, gettext("This page"), here=True)
     relative = next((one for one in related if one.asked == "along"), None)
     if relative is None:
-        return Question(text, gettext("Not run yet: choose the values"), f"/new?clone={study_id}#axes")
+        return Question(text, gettext("Not run yet: choose the values"), f"/new?clone={study_id}&asks=axes&batch=")
     answer = brief(_headline(library, relative), reading) or relative.record.name
     return Question(text, answer, f"/studies/{relative.record.id}")
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from markupsafe import Markup
 from starlette.datastructures import QueryParams
 
 from sprag.service.faults import SelectionError
 from sprag.service.http.web.held import fixed_choices, with_held
 from sprag.service.http.web.sheet.chart import CHOICES, chart_of, chosen_curves, point_of
-from sprag.service.http.web.sheet.machine import machine_drawings
+from sprag.service.http.web.sheet.machine import Machine, machine_of
 from sprag.service.http.web.sheet.side import Side, short_titles, side_of
 from sprag.service.http.web.view_forms import Fact, fact_of
 from sprag.service.reading.catalogue import unit_of
@@ -50,7 +49,7 @@ class Sheet:
     dimensions: list[Fact]
     limits: list[Fact]
     chart: Chart | None
-    drawings: list[Markup]
+    machine: Machine
     side: Side
     gap: tuple[str, str, str] | None = None
     fixed: list[dict[str, Any]] = field(default_factory=list)
@@ -109,7 +108,7 @@ def _sheet(
         ],
         [fact_of(one, reading, own) for one in headline.limits],
         chart,
-        machine_drawings(study, reading, best),
+        machine_of(study, library.store.studies.spec(study_id), study_id, reading, best),
         side_of(library, study_id, headline, reading),
         gap,
         fixed_choices(study, drawn, at, reading) if drawn else [],

@@ -262,6 +262,13 @@ if (refused) {
   refused.scrollIntoView({ block: "center" });
 }
 listen();
+// An address that has the name of a field leads into it.
+const asked = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+if (asked && form.contains(asked) && !refused) {
+  asked.closest("details")?.setAttribute("open", "");
+  asked.focus();
+  asked.select?.();
+}
 if ("unchecked" in form.dataset) check();
 const draft = sprag.drafts.waiting(form, Boolean(refused));
 if (draft) sprag.drafts.offer(form, draft, (fields) => newShape([], new URLSearchParams(fields)));

@@ -14,6 +14,7 @@ from playwright.sync_api import expect
 from sprag.worker import models
 from sprag.worker.models import ChunkResult
 from tests.service.calibrating import calibration
+from tests.service.http.web.fields import named
 from tests.service.http.web.test_accessibility import BEYOND, preset, serve
 from tests.service.rounds import run_round
 from tests.service.searching import search
@@ -192,6 +193,30 @@ def test_questions_and_variants_lead_to_relatives(page: Page, kinds: dict[str, s
     strip.get_by_role("checkbox", name="compare Arm").check()
     strip.get_by_role("button", name="Compare the ticked ones").click()
     page.wait_for_url(f"**/compare?study={kinds['grid']}&study={kinds['variant']}")
+
+
+def test_each_value_of_the_machine_leads_to_its_field_in_a_variant(page: Page, kinds: dict[str, str]) -> None:
+    for kind, value, field, text in (
+        ("variant", "36 mm", "/base/pendulums/0/arm", "36"),
+        ("shaft", "120 rpm", "/base/mean_speed", "120"),
+    ):
+        page.goto(f"/studies/{kinds[kind]}")
+        page.locator(".machine").get_by_role("link", name=value).click()
+        expect(named(page, field)).to_be_focused()
+        expect(named(page, field)).to_have_value(text)
+        assert page.evaluate("() => document.activeElement.selectionEnd") == len(text)
+    page.goto(f"/studies/{kinds['grid']}")
+    page.locator(".machine").get_by_role("link", name="N·m").click()
+    expect(page.locator('a.range[id="/base/shaft/load"]')).to_be_focused()
+
+
+def test_a_question_that_is_not_answered_yet_begins_a_study_that_asks_it(page: Page, kinds: dict[str, str]) -> None:
+    page.goto(f"/studies/{kinds['shaft']}")
+    page.locator(".ask").get_by_role("link", name="Which design is best?").click()
+    expect(page.get_by_label("Which design is best?")).to_be_checked()
+    page.go_back()
+    page.locator(".ask").get_by_role("link", name="What do tolerances do?").click()
+    expect(page.locator("#batch")).to_be_checked()
 
 
 def test_former_addresses_keep_their_choices(service: Service, kinds: dict[str, str]) -> None:
