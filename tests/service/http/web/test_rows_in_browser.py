@@ -177,3 +177,14 @@ def test_rows_beside_each_other_have_room_for_numbers_on_a_phone(visitor: Visito
     first = page.locator("table.beside tbody th").first.bounding_box()
     assert first is not None
     assert first["width"] < 390 / 2
+
+
+@pytest.mark.parametrize("visitor", [{"viewport": {"width": 390, "height": 800}}], indirect=True)
+def test_numbers_of_points_can_be_read_on_a_phone(visitor: Visitor, example: str) -> None:
+    page = visitor.page
+    page.goto(f"/studies/{example}/rows?plot=points")
+    heights = page.evaluate(
+        "() => [...document.querySelectorAll('.points svg text')].map((text) => text.getBoundingClientRect().height)"
+    )
+    assert min(heights) >= 9
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
