@@ -162,6 +162,9 @@ def test_the_page_keeps_shows_refuses_and_removes(service: Service) -> None:
     assert 'name="name" value="F-120"' in changed
     assert 'name="fields/spring_rate" value="9 N/mm"' in changed
     assert service.http.get("/parts?edit=cm_none").status_code == 404
+    # The button that removes is behind one that says so.
+    removes = f'<summary>Remove</summary><ul><li><form method="post" action="/parts/{component}/delete">'
+    assert removes in service.http.get("/parts").text
     service.http.post(f"/parts/{component}/delete")
     assert service.store.components.all("spring") == ()
 
