@@ -63,7 +63,6 @@ from sprag.service.http.web import (
     motion,
     moved,
     pages,
-    results,
     study,
 )
 from sprag.service.http.web import components as component_pages
@@ -160,7 +159,6 @@ ROUTED = (
     study,
     front,
     rows,
-    results,
     matters,
     motion,
     compare,

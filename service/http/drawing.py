@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
-from fastapi import Query
 from starlette.requests import Request
 from starlette.responses import Response
 
@@ -22,8 +21,6 @@ from sprag.worker import models
 if TYPE_CHECKING:
     from sprag.service.storage.studies.records import StudyRecord
 
-#: Panels in a row of a figure; a narrow place asks for one.
-Columns = Annotated[int, Query(ge=1, le=2)]
 #: Formats of what is drawn from rows and written as a table too.
 DRAWN_FORMATS: Final = dict[Literal["json", "csv"] | pictures.Picture, str](
     [("json", MEDIA_TYPES["json"]), ("csv", MEDIA_TYPES["csv"]), *pictures.MEDIA_TYPES.items()]

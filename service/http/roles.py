@@ -59,10 +59,9 @@ _VIEWER: Final = (
     "GET /", "GET /new", "POST /new/check", "POST /new/live", "POST /new/along", "GET /calibrate",
     f"GET {_PAGE}",
     *(f"GET {_PAGE}/{part}" for part in (
-        "delete", "extend", "labels", "front", "figures/front", "explore", "explore/new", "explore/compare",
+        "delete", "extend", "labels", "front", "explore", "explore/new", "explore/compare",
         "rows", "rows/new", "rows/file", "rows/search.svg",
-        "matters", "calibration", "drives", "sensitivity", "figures/calibration", "curves", "map", "figures/curves",
-        "figures/answers", "figures/map", "cases", "document",
+        "matters", "calibration", "drives", "sensitivity", "curves", "map", "cases", "document",
     )),
     f"GET {_PAGE_CASE}",
     *(f"GET {_PAGE_CASE}/{part}" for part in (

@@ -12,7 +12,7 @@ from sprag.service.figures.answers import answers_figure
 from sprag.service.figures.pictures import Picture, require_drawable
 from sprag.service.results.curve_cases import select
 from sprag.service.results.curves import CurveQuery
-from sprag.service.results.key_answer_words import answers_csv, curve_name, curve_named, report
+from sprag.service.results.key_answer_words import answers_csv, report
 from sprag.service.results.key_answers import StudyAnswers, answers_query, find_answers, read_point
 from sprag.service.storage.studies.records import CaseColumns
 from sprag.service.views import study_view
@@ -32,11 +32,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class AnswersChoice:
-    """The curves, None for those of the page; the working point; and the name of a curve that a figure picks out."""
+    """The curves, None for those of the page; and the working point."""
 
     query: CurveQuery | None
     point: str | None
-    curve: str = ""
 
 
 def answers_of(library: Library, study_id: str, chosen: CurveQuery | None, point: str | None) -> StudyAnswers:
@@ -101,9 +100,7 @@ class AnswersView(StudyView[AnswersQuestion, AnswersChoice, StudyAnswers]):
         """The curves of the main results with their answers marked; None where the cases lie on no curve."""
         if answer.result.drawn is None:
             return None
-        study = answer.study
-        curve = curve_named([curve_name(one, study) for one in answer.result.curves], answer.chosen.curve)
-        return answers_figure(answer.result, columns, chosen=curve)
+        return answers_figure(answer.result, columns)
 
     def picture(
         self, answer: StudyAnswer[AnswersChoice, StudyAnswers], reading: Reading, title: str, form: Picture

@@ -1,7 +1,6 @@
 """The views of a study: what each is asked, how it is found in the rows of the study, and how it is written and drawn.
 
-One description serves the address of the API (`sprag.service.http.api.study_views`) and the figures of pages
-(`sprag.service.http.web.figures.studies`).
+One description serves the addresses of the API (`sprag.service.http.api.study_views`), the pages and the command line.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ from sprag.service.cli.console import cell_text
 from sprag.service.client import AsyncClient, Client
 from tests.conftest import Finished
 from tests.service.conftest import API, PortalTransport, Service
-from tests.service.figures.seen import seen
+from tests.service.figures.seen import chart_of
 
 AXES = [
     {"path": "excitation.frequency", "linspace": ["20 Hz", "30 Hz", 11]},
@@ -156,7 +156,7 @@ def test_a_chosen_family_is_in_the_address_of_curves(filled: tuple[Service, str]
     assert former.status_code == 308
     text = service.http.get(former.headers["location"]).text
     assert "3 of 11 curves" in text
-    panel, _ = seen(text.partition('id="chart"')[2].partition("</figure>")[0]).panels
+    panel, _ = chart_of(text).panels
     assert sorted(curve.name for curve in panel.curves) == ["20", "23", "30"]
     every = service.http.get(f"/studies/{study_id}?x=shaft.load&by=excitation.frequency&every=1").text
     assert "11 of 11 curves" in every

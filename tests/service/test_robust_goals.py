@@ -92,7 +92,6 @@ def test_the_designs_have_their_quantiles_and_yields(ended: tuple[Service, str])
     assert "efficiency (25 % quantile)" in table.text
     for page in ("", "/rows", "/cases/0", "/document"):
         assert service.http.get(f"/studies/{study_id}{page}").status_code == 200
-    assert service.http.get(f"/studies/{study_id}/figures/front").status_code == 200
 
 
 def test_a_design_is_studied_further_with_the_same_drives(ended: tuple[Service, str]) -> None:

@@ -25,7 +25,6 @@ from sprag.service.http.drawing import Drawing, attached, picture, tag_of, unles
 from sprag.service.http.reading import FileChoice, address_pairs
 from sprag.service.http.routers import page_router
 from sprag.service.http.web.figures.drawn import drawn as drawn_figure
-from sprag.service.http.web.figures.studies import PART
 from sprag.service.http.web.held import fixed_choices
 from sprag.service.http.web.saved_views import saved_here
 from sprag.service.http.web.templates import page
@@ -270,7 +269,7 @@ async def compare_figure(work: Attended, choice: FileChoice) -> Response:
     """The figure of a comparison."""
 
     def show(curves: list[tuple[str, Curves]], reading: Reading) -> Response:
-        return Response(drawn_figure(read_figure(curves_figure(curves), reading)), media_type=PART)
+        return Response(drawn_figure(read_figure(curves_figure(curves), reading)), media_type="text/html")
 
     return await _answered(work, choice, show)
 

@@ -1,10 +1,9 @@
-"""The designs of a search as figures: two quantities of each, and how the search has come to them."""
+"""How a search has come to its designs, as a picture."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-from fastapi import Query
 from starlette.responses import Response
 
 from sprag.service.figures.front import history_figure
@@ -14,11 +13,8 @@ from sprag.service.http.context import StudyId
 from sprag.service.http.drawing import Drawing, conditional, picture
 from sprag.service.http.reading import FileChoice
 from sprag.service.http.routers import page_router
-from sprag.service.http.web.figures.studies import figure_of
 from sprag.service.http.work import Attended
-from sprag.service.views.front import FrontView
 from sprag.service.views.library import reading_of
-from sprag.service.views.study_questions import FrontQuestion
 
 if TYPE_CHECKING:
     from sprag.service.figures.pictures import Picture
@@ -27,15 +23,6 @@ if TYPE_CHECKING:
     from sprag.service.views.library import Library
 
 router = page_router()
-
-X = Annotated[str, Query(max_length=200)]
-
-
-@router.get("/studies/{study_id:study}/figures/front")
-async def front_of(work: Attended, study_id: StudyId, choice: FileChoice, x: X = "", y: X = "") -> Response:
-    """The figure of all designs over two quantities."""
-    question = FrontQuestion(x=x or None, y=y or None)
-    return await figure_of(work, study_id, "front", lambda study: FrontView().choose(study, question), choice)
 
 
 @router.get("/studies/{study_id:study}/rows/search.svg")

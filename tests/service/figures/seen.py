@@ -64,6 +64,11 @@ def seen(drawn: str | bytes) -> Seen:
     return Seen([element.text or "" for element in root.iter("text")], panels)
 
 
+def chart_of(page: str) -> Seen:
+    """What the chart of the sheet of a study shows."""
+    return seen(page.partition('<figure id="chart"')[2].partition("</figure>")[0])
+
+
 def _panel(element: ElementTree.Element) -> Panel:
     scales = [_scale(element.get(f"data-{axis}", "")) for axis in "xy"]
     found = Panel(fills=[shape.get("fill", "") for shape in element.iter() if shape.get("fill")])

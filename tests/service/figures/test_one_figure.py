@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from tests.service.figures.seen import Seen, seen
+from tests.service.figures.seen import Seen, chart_of, seen
 from tests.service.spec_sample import changed
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def downloaded(service: Service, page: str, svg: str) -> tuple[Seen, Seen]:
     assert answer.status_code == 200, answer.text
     assert answer.headers["content-type"] == "image/svg+xml"
     assert "var(--" not in answer.text
-    return seen(text.partition('id="chart"')[2].partition("</figure>")[0]), seen(answer.text)
+    return chart_of(text), seen(answer.text)
 
 
 def alike(page: Seen, file: Seen) -> None:

@@ -220,8 +220,6 @@ def test_a_map_has_rows_of_y(service: Service, grid: dict[str, Any]) -> None:
         "/api/v1/studies/{}/curves?x=shaft.load&y=torque.max&at=excitation.frequency=16&at=excitation.amplitude_x=0.001"
         "&format=csv",
         "/api/v1/studies/{}/map?x=shaft.load&y=excitation.frequency&z=torque.max&at=excitation.amplitude_x=0.001",
-        "/studies/{}/figures/curves",
-        "/studies/{}/figures/map?kind=contour",
     ],
 )
 def test_many_numbers_are_written_by_a_process_that_checks(

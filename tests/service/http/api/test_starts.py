@@ -22,7 +22,7 @@ from sprag.worker.models import Basin, ChunkResult, FurtherRows
 from sprag.worker.models.starts import motion_of
 from sprag.worker.study import Study
 from tests.service.conftest import API, PortalTransport, Service
-from tests.service.figures.seen import seen
+from tests.service.figures.seen import chart_of
 from tests.service.timed_spec import SPEC
 
 SPEED = "shaft.initial_speed"
@@ -89,12 +89,10 @@ def test_curves_are_those_of_one_regime(service: Service, started: str) -> None:
 
 def test_pictures_mark_the_other_motions(service: Service, started: str) -> None:
     asked = {"x": "shaft.load", "y": "shaft.speed.mean"}
-    page = service.http.get(f"/studies/{started}/figures/curves", params=asked).text
-    assert seen(page).has("other motions of the same cases")
+    page = service.http.get(f"/studies/{started}", params={**asked, "units": "si"}).text
+    assert chart_of(page).has("other motions of the same cases")
     assert "<title>0.2 N·m, 3.5 rad/s, other motions of the same cases, case 1</title>" in page
     assert service.http.get(f"{API}/studies/{started}/curves", params={**asked, "format": "svg"}).status_code == 200
-    sheet = service.http.get(f"/studies/{started}").text
-    assert "other motions of the same cases" in sheet
 
 
 def test_maps_of_the_motions_are_a_click_away(service: Service) -> None:

@@ -8,7 +8,7 @@ from sprag.service.http.web.form.spec import spec_of
 from sprag.service.spec.design import design_spec
 from sprag.service.spec.document import parse_spec
 from tests.service.conftest import Service
-from tests.service.figures.seen import seen
+from tests.service.figures.seen import chart_of, seen
 from tests.service.http.web.controls import Controls
 from tests.service.searching import search
 
@@ -16,10 +16,11 @@ from tests.service.searching import search
 def test_the_scatter_has_every_design_that_has_not_failed(service: Service) -> None:
     study_id = search(service)
     designs = service.get(f"/studies/{study_id}/front")["designs"]
-    (panel,) = seen(service.http.get(f"/studies/{study_id}/figures/front").text).panels
+    (panel,) = chart_of(service.http.get(f"/studies/{study_id}").text).panels
     assert sorted(panel.cases) == sorted(item["cases"][0] for item in designs if None not in item["goals"].values())
     assert panel.curves == []
-    other = seen(service.http.get(f"/studies/{study_id}/figures/front?x=excitation.frequency&y=shaft.speed.mean").text)
+    axes = {"x": "excitation.frequency", "y": "shaft.speed.mean"}
+    other = seen(service.http.get(f"/api/v1/studies/{study_id}/front", params={**axes, "format": "svg"}).text)
     assert other.has("Excitation frequency (Hz)", "front", "feasible")
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 #: What people read of a page: without the spec itself, code, scripts and attributes.
 _HIDDEN = re.compile(r"<(pre|code|style|script|title)\b.*?</\1>|<[^>]*>|Name in specs.*?</table>", re.DOTALL)
 _PARTS = ("", "?x=excitation.frequency", "?z=efficiency", "/rows", "/rows?plot=points", "/cases/0")
-_FIGURES = ("figures/curves?y=shaft.speed.mean&y=torque.mean&", "figures/answers?")
+_PICTURES = ("curves?x=shaft.load&y=shaft.speed.mean&y=torque.mean&by=excitation.frequency&", "answers?")
 
 
 def names_of(service: Service, study_id: str) -> set[str]:
@@ -42,8 +42,8 @@ def test_no_code_name_stands_where_a_caption_should(service: Service, study_id: 
         assert page.status_code == 200, part
         seen = _HIDDEN.sub(" ", page.text)
         assert sorted(name for name in names if re.search(rf"(?<![\w.]){re.escape(name)}(?![\w.])", seen)) == [], part
-    for address in _FIGURES:
-        figure = service.http.get(f"/studies/{study_id}/{address}columns=1").text
+    for address in _PICTURES:
+        figure = service.http.get(f"/api/v1/studies/{study_id}/{address}format=svg").text
         assert "<svg" in figure
         assert sorted(name for name in names if name in figure) == [], address
 
