@@ -186,7 +186,7 @@ def plan_of(study: Study, query: ExploreQuery, further: Sequence[ResultInfo] = (
     """
     own = {info.name for info in further}
     infos = [*further, *(info for info in models.study_results(study) if info.name not in own)]
-    units, regime = quantities(study, infos), models.regime_info(infos)
+    units, regime = _quantities(study, infos), models.regime_info(infos)
     if len(query.where) > MOST_RANGES:
         raise refused(
             "where",
@@ -231,10 +231,9 @@ def usual_quantities(study: Study, infos: Sequence[ResultInfo]) -> tuple[str, ..
     return (*own_paths(study), *results)[:MOST_SHOWN]
 
 
-def quantities(study: Study, infos: Sequence[ResultInfo] | None = None) -> dict[str, str]:
-    """Units of everything that ranges, order and histograms can be about, by name: of ``infos`` or all results."""
-    infos = models.study_results(study) if infos is None else infos
-    units = {path: unit_of(study, path) for path in own_paths(study)}
+def _quantities(study: Study, infos: Sequence[ResultInfo]) -> dict[str, str]:
+    """Units of everything that ranges, order and histograms can be about, by name."""
+    units = {path: unit_of(study, path) for path in study.column_paths}
     return units | {info.name: info.unit for info in infos if info.kind != "category"}
 
 

@@ -12,7 +12,7 @@ import pytest
 from sprag.service.faults import SelectionError
 from sprag.service.figures.explore import explore_figure
 from sprag.service.http.web.rows.lines import HEIGHT, TOP, lines_of
-from sprag.service.results.explore import ExploreQuery, explore, histogram, plan_of
+from sprag.service.results.explore import ExploreQuery, explore, explored_json, histogram, plan_of
 from sprag.service.spec.document import parse_spec
 from sprag.service.storage.rows.columns import RowColumns
 from sprag.worker import models
@@ -198,3 +198,12 @@ def test_lines_have_every_row_or_say_how_many_are_left_out(study: Study, rows: R
     assert plot.left_out == 5_000 - len(shown) > 3_000
     assert {*first(explored)} <= shown
     assert max(shown) > 4_900
+
+
+def test_an_axis_of_several_parameters_is_asked_about_by_any_of_them(spec: dict[str, Any]) -> None:
+    tied = {"path": ["excitation.amplitude_x", "excitation.amplitude_y"], "values": ["1 mm", "2 mm", "3 mm"]}
+    study, second = parse_spec({**spec, "axes": [tied]}).study, "excitation.amplitude_y"
+    rows = RowColumns(np.arange(3), KINDS[:1], np.zeros(3, dtype=np.int32), {})
+    explored = found(study, rows, f"{second} >= 2 mm", sort=f"-{second}", show=(second,))
+    assert first(explored) == [2, 1]
+    assert [item["unit"] for item in explored_json("st_1", explored)["quantities"]] == ["m"]
