@@ -103,7 +103,7 @@ def test_curves_and_maps(filled: tuple[Service, str]) -> None:
         f"/api/v1/studies/{study_id}/curves?x=drive.inertia&y=irregularity&by=mean_speed&format=svg"
     )
     assert picture.status_code == 200
-    for page in ("", "/cases", "/cases/30", "?z=irregularity"):
+    for page in ("", "/rows", "/cases/30", "?z=irregularity"):
         assert service.http.get(f"/studies/{study_id}{page}").status_code == 200
 
 
