@@ -7,7 +7,7 @@ where a case stands, and otherwise from the straight line between two neighbours
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
@@ -225,13 +225,13 @@ def answers_at(study: Study, infos: Sequence[ResultInfo], found: StudyAnswers, p
 
 def usual_curve(study: Study, found: StudyAnswers) -> int:
     """The place of the curve nearest to the machine of the base; that of the first of several."""
+    lines = [one.line for one in found.curves]
+    return min(range(len(lines)), key=lambda place: from_base(study, lines[place].by), default=0)
 
-    def distance(one: CurveAnswers) -> float:
-        return sum(
-            abs(value - study.base.get(path, value)) / (abs(value) or 1.0) for path, value in one.line.by.items()
-        )
 
-    return min(range(len(found.curves)), key=lambda place: distance(found.curves[place]), default=0)
+def from_base(study: Study, by: Mapping[str, float]) -> float:
+    """How far what tells a curve apart lies from the machine of the base."""
+    return sum(abs(value - study.base.get(path, value)) / (abs(value) or 1.0) for path, value in by.items())
 
 
 def _fits(study: Study, answer: Answer, x: str) -> bool:

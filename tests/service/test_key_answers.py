@@ -20,6 +20,7 @@ from anyio.from_thread import BlockingPortal
 from sprag.service.cli import study_views
 from sprag.service.cli.console import cell_text
 from sprag.service.client import AsyncClient, Client
+from sprag.service.http.web.sheet import chart
 from tests.conftest import Finished
 from tests.service.conftest import API, PortalTransport, Service
 from tests.service.figures.seen import chart_of
@@ -138,6 +139,15 @@ def test_the_page_says_the_answers_first(filled: tuple[Service, str]) -> None:
             assert f'href="/studies/{study_id}/cases/{item["cases"][0]}"' in text
     for picture in re.findall(r'href="([^"]+format=svg)"', text):
         assert service.http.get(picture.replace("&amp;", "&")).text.startswith("<")
+
+
+def test_a_long_curve_is_not_told_case_by_case(filled: tuple[Service, str], monkeypatch: pytest.MonkeyPatch) -> None:
+    service, study_id = filled
+    monkeypatch.setattr(chart, "_TOLD", 4)
+    monkeypatch.setattr(chart, "case_sentence", None)
+    page = service.http.get(f"/studies/{study_id}")
+    assert page.status_code == 200
+    assert "data-cases='[]'" in page.text
 
 
 @pytest.mark.parametrize("text", ["3 mm", "abc"])

@@ -157,7 +157,6 @@ def _page(
         "matters.html",
         status=status,
         **frame,
-        tab="/matters",
         ask=ask,
         asks={name: STUDY_VIEWS[views[0]].about.title for name, views in ASKS.items()},
         known=known,

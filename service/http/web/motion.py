@@ -220,7 +220,6 @@ def _page(
         status=status,
         **frame,
         **values,
-        tab="/cases",
         case=case,
         last=study.cases - 1,
         own=own,

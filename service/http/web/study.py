@@ -20,6 +20,7 @@ from sprag.service.http.threads import in_thread
 from sprag.service.http.web.figures.fits import fits_of, has_measured_clutch
 from sprag.service.http.web.form.values import changed_meanwhile
 from sprag.service.http.web.saved_views import saved_here, view_actions
+from sprag.service.http.web.sheet.chart import has_chart
 from sprag.service.http.web.sheet.drawer import drawer_of, map_pairs, with_query
 from sprag.service.http.web.sheet.side import trust_of
 from sprag.service.http.web.sheet.view import sheet_of
@@ -151,6 +152,7 @@ def _study_page(
         **frame,
         **extension,
         sheet=sheet,
+        has_chart=has_chart(study),
         faults=sheet.faults,
         trust=trust_of(study_id, progress, kinds),
         settled=models.is_settled(study.run),

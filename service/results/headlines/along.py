@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 
 #: What is less than this share of its neighbour is worth a sentence.
 _LEFT: Final = 0.5
+#: The end of the name of a half width.
+_WIDTH: Final = models.half_width("")
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,16 +205,11 @@ def case_sentence(own: Along, place: int) -> Phrase:
 
 
 def _clause(own: Along, place: int) -> Phrase:
-    values = {name: own.value(place, name) for name in own.curve.y if name in own.infos and not is_width(name)}
+    values = {name: own.value(place, name) for name in own.curve.y if name in own.infos and not name.endswith(_WIDTH)}
     widths = {name: width for name in values if (width := _width(own, place, name)) is not None}
     first = own.first.name
     values = {first: values[first], **values}
     return NOTHING if not np.isfinite(values[first]) else told(own.study, own.infos, values, widths)
-
-
-def is_width(name: str) -> bool:
-    """Whether a result is the half width of another one."""
-    return name.endswith(models.half_width(""))
 
 
 def _width(own: Along, place: int, name: str) -> float | None:

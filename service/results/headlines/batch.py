@@ -23,6 +23,7 @@ from sprag.service.results.headlines.headline import (
     digits,
     trace_of,
 )
+from sprag.service.results.key_answers import from_base
 from sprag.service.results.selection import value_of
 from sprag.service.results.tolerances.batch import Asked
 from sprag.service.results.tolerances.conditions import first_condition
@@ -61,7 +62,7 @@ def batch_headline(
     """
     name = judged_by(study, drawn_results(study, infos))
     found = ribbon(study, infos, (name,), asked, QUANTILES, fetch)
-    line, place = _usual_line(study, found), 0
+    line, place = min(found.lines, key=lambda one: from_base(study, one.line.by)), 0
     gap = None
     if found.places.x is not None:
         x = _point(study, found.places.x, point)
@@ -76,16 +77,6 @@ def batch_headline(
         gap=gap,
         case=int(line.line.cases[place]),
     )
-
-
-def _usual_line(study: Study, found: Ribbon) -> RibbonLine:
-    """The line nearest to the machine of the base."""
-
-    def distance(line: RibbonLine) -> float:
-        pairs = line.line.by.items()
-        return sum(abs(value - study.base.get(path, value)) / (abs(value) or 1.0) for path, value in pairs)
-
-    return min(found.lines, key=distance)
 
 
 def _point(study: Study, path: str, text: str | None) -> float:

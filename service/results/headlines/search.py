@@ -9,7 +9,7 @@ import numpy as np
 from sprag.sentences import Amount, Name
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.reader import Phrase, joined, plural, term
-from sprag.service.results.fronts import history
+from sprag.service.results.fronts import history, worst_of
 from sprag.service.results.headlines.headline import (
     MOST,
     NOTHING,
@@ -116,15 +116,9 @@ def _limit(found: Designs, best: int, limit: Limit) -> KeyNumber:
         text = term(str(cell)) if info.kind == "category" else Amount(limit.value, info.unit)
         note = Phrase("as required") if met else Phrase("required: {value}", value=text)
         return KeyNumber(limit.name, str(term(own)) if isinstance(own, str) else own, info.unit, note=note, case=case)
-    signs = {"at_least": 1.0, "at_most": -1.0}
-    if limit.kind == "is":
-        place = int(np.argmax(np.abs(values - limit.value)))
-        reserve = limit.within - abs(float(values[place]) - limit.value)
-    else:
-        left = signs[limit.kind] * (values - limit.value)
-        place = int(np.argmin(left))
-        reserve = float(left[place])
-    value = float(values[place])
+    value = float(worst_of(limit, values[np.newaxis])[0])
+    off = value - limit.value
+    reserve = {"is": limit.within - abs(off), "at_least": off, "at_most": -off}[limit.kind]
     unit, bound = info.unit, _amount(found, limit.name, limit.value)
     note = _reserve(limit, bound, reserve / limit.scale)
     return KeyNumber(limit.name, value, unit, digits(value), note=note, case=case)

@@ -102,7 +102,6 @@ def _page(context: Context, study_id: str, view: RowsPage) -> Response:
         "rows.html",
         status=422 if asked.faults else 200,
         **frame,
-        tab="/rows",
         view=view,
         asked=asked,
         query=asked.query,

@@ -34,7 +34,7 @@ from sprag.service.views.drives import RibbonQuery, RibbonView
 from sprag.service.views.front import FrontView
 from sprag.service.views.relatives import asked_by
 from sprag.service.views.study_questions import FrontQuestion
-from sprag.service.views.study_view import StudyAnswer
+from sprag.service.views.study_view import found
 from sprag.worker import models
 
 if TYPE_CHECKING:
@@ -44,8 +44,8 @@ if TYPE_CHECKING:
     from sprag.service.reading.reader import Reading
     from sprag.service.results.choice import MapQuery
     from sprag.service.results.key_answers import StudyAnswers
-    from sprag.service.results.tolerances.batch import Asked
     from sprag.service.views.library import Library
+    from sprag.service.views.study_view import StudyView
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Study
 
@@ -99,6 +99,12 @@ class Chart:
     family: list[tuple[str, list[tuple[str, str]]]] = field(default_factory=list)
 
 
+def has_chart(study: Study) -> bool:
+    """Whether a study is drawn on its sheet once it has rows."""
+    chosen = study.plan is not None or study.spread is not None
+    return chosen or answers_query(study, models.study_results(study)) is not None
+
+
 def chart_of(
     library: Library, study_id: str, params: QueryParams, usual: CurveQuery | None, reading: Reading, cases: str
 ) -> Chart | None:
@@ -107,47 +113,37 @@ def chart_of(
     Raises SelectionError. ``cases`` is the address of the cases.
     """
     study = library.store.studies.study(study_id)
-    draw = partial(_drawn, reading=reading, cases=cases)
+    draw = partial(_drawn, library, study_id, reading, cases)
     kind = asked_by(study)
     if kind == "best":
-        found = FrontView().find(library, study_id, FrontQuestion())
-        answer: Any = StudyAnswer(library, study_id, FrontQuestion(), found)
-        return draw(FrontView().figure(answer), Phrase("Every design of the search"), "front", "")
+        return draw(FrontView(), FrontQuestion(), Phrase("Every design of the search"))
     if kind == "measured":
-        known = library.calibrations.of(study_id)
-        answer = StudyAnswer(library, study_id, None, known)
-        return draw(
-            CalibrationView().figure(answer, 1), Phrase("Measured points on the fitted curve"), "calibration", ""
-        )
+        return draw(CalibrationView(), None, Phrase("Measured points on the fitted curve"))
     infos = models.study_results(study)
     if params.get("z") or (map_plan(study) is not None and not params.get("x")):
         return _map(library, study_id, study, infos, params, reading, cases)
     if study.spread is not None and not any(params.get(name) for name in CHOICES):
-        return _ribbon(library, study_id, study, infos, asked_like(usual), draw)
+        names, places = (judged_by(study, [info.name for info in infos]),), asked_like(usual)
+        own = pairs_of(CurveQuery(places.x or "", names, places.by, places.at))
+        query = RibbonQuery(names, places, QUANTILES, False)
+        title = Phrase("9 of 10 drives lie in the band")
+        return draw(RibbonView(), query, title, urlencode([pair for pair in own if pair[1]]))
     return _curves(library, study_id, study, infos, params, usual, reading, cases)
 
 
 def _drawn(
-    figure: Figure | None, title: Phrase, view: str, query: str, *, reading: Reading, cases: str
-) -> Chart | None:
-    if figure is None:
-        return None
+    library: Library,
+    study_id: str,
+    reading: Reading,
+    cases: str,
+    view: StudyView[Any, Any, Any],
+    chosen: Any,
+    title: Phrase,
+    query: str = "",
+) -> Chart:
     label = reading.say(title)
-    read = read_figure(figure, reading)
-    return Chart(drawn(replace(read, columns=1), label, cases), label, view, query, list(read.held))
-
-
-def _ribbon(
-    library: Library, study_id: str, study: Study, infos: tuple[ResultInfo, ...], asked: Asked, draw: Any
-) -> Chart | None:
-    names = (judged_by(study, [info.name for info in infos]),)
-    query = RibbonQuery(names, asked, QUANTILES, False)
-    view = RibbonView()
-    answer = StudyAnswer(library, study_id, query, view.find(library, study_id, query))
-    roles = [("x", asked.x)] if asked.x else []
-    pairs = [*roles, *(("y", name) for name in names), *(("by", path) for path in asked.by)]
-    pairs += [("at", f"{path}={value}") for path, value in asked.at]
-    return draw(view.figure(answer, 1), Phrase("9 of 10 drives lie in the band"), "ribbon", urlencode(pairs))  # type: ignore[no-any-return]
+    read = read_figure(view.drawn_in(found(library, study_id, view, chosen), 1), reading)
+    return Chart(drawn(replace(read, columns=1), label, cases), label, view.about.name, query, list(read.held))
 
 
 def as_map(params: QueryParams) -> QueryParams:
@@ -169,8 +165,8 @@ def _map(
     query = map_query(study, infos, as_map(params))
     if query is None:
         return None
-    found = stored_map(library.store, study_id, CurveQuery(query.x, (query.z,), (query.y,), query.at))
-    read = read_map(found, reading)
+    mapped = stored_map(library.store, study_id, CurveQuery(query.x, (query.z,), (query.y,), query.at))
+    read = read_map(mapped, reading)
     label = Phrase(
         "{z} over {x} and {y}", z=reading.caption(query.z), x=reading.within(query.x), y=reading.within(query.y)
     )
@@ -204,46 +200,48 @@ def _curves(
     reading: Reading,
     cases: str,
 ) -> Chart | None:
-    found = answers_of_address(library, study_id, params, usual, reading)
-    if found.query is None or found.drawn is None:
+    answers = answers_of_address(library, study_id, params, usual, reading)
+    if answers.query is None or answers.drawn is None:
         return None
     names, below = results_of(study, infos, params)
-    curves = drawn_curves(library.store, study_id, replace(found.query, y=names))
+    query = replace(answers.query, y=names)
+    curves = drawn_curves(library.store, study_id, query)
     figure = curves_figure([("", curves)], 1)
     if below:  # after how many periods motions repeat is for those who choose curves
         figure = replace(figure, spans={}, looks={})
-    titles = tuple(curve_name(one, study) for one in found.curves)
-    chosen = curve_place(study, found, params.get("curve") or "")
-    curve, by_name = found.drawn.curves[chosen], {info.name: info for info in infos}
+    titles = tuple(curve_name(one, study) for one in answers.curves)
+    chosen = curve_place(study, answers, params.get("curve") or "")
+    curve, by_name = answers.drawn.curves[chosen], {info.name: info for info in infos}
     asked = bool((params.get("point") or "").strip())
-    spot = place_on(curve, judged_by(study, curve.y), found.point, asked=asked)
+    spot = place_on(curve, judged_by(study, curve.y), answers.point, asked=asked)
     slider = None
     if spot is not None and not figure.note:
-        own = Along(study, by_name, curve, found.query.x, *spot)
+        own = Along(study, by_name, curve, answers.query.x, *spot)
         figure = _with_point(figure, own, names, chosen)
         slider = _slider(own, reading)
     read = read_figure(figure, reading)
-    title = caption(study, replace(found.query, y=names)).said(reading)
+    title = caption(study, query).said(reading)
     if study.sweep is not None:  # the answer says it
         read = replace(read, below="")
-    picture = drawn(read, title, cases, str(chosen) if len(found.curves) > 1 else "")
-    query = replace(found.query, y=names)
+    picture = drawn(read, title, cases, str(chosen) if len(answers.curves) > 1 else "")
     return Chart(
         picture, title, "curves", urlencode(pairs_of(query)), list(read.held),
         slider=slider, curves=query, chosen=chosen, names=titles,
         lower=tuple((name, name in names) for name in below),
-        family=_family(found, titles, reading) if len(found.curves) > 1 else [],
+        family=_family(answers, titles, reading) if len(answers.curves) > 1 else [],
     )  # fmt: skip
 
 
-def _family(found: StudyAnswers, titles: Sequence[Phrase], reading: Reading) -> list[tuple[str, list[tuple[str, str]]]]:
+def _family(
+    answers: StudyAnswers, titles: Sequence[Phrase], reading: Reading
+) -> list[tuple[str, list[tuple[str, str]]]]:
     """The answers of every curve in words."""
     return [
         (
             reading.say(title),
-            [(one.title(reading), one.said(reading)) for one in curve_numbers(answers, found.unit)],
+            [(number.title(reading), number.said(reading)) for number in curve_numbers(one, answers.unit)],
         )
-        for title, answers in zip(titles, found.curves, strict=True)
+        for title, one in zip(titles, answers.curves, strict=True)
     ]
 
 
@@ -296,9 +294,9 @@ def _slider(own: Along, reading: Reading) -> Slider | None:
         return None
     told = [
         (float(reading.value(float(x[at]), si)), case_sentence(own, place).said(reading))
-        for at, place in enumerate(run)
+        for at, place in enumerate(run if len(run) <= _TOLD else ())
     ]
     missing = Phrase("No case was run at {place}.", place="#").said(reading)
     low, high = (float(reading.value(float(end), si)) for end in (x.min(), x.max()))
     value = float(f"{reading.value(own.x, si):.10g}")
-    return Slider(own.path, low, high, value, reading.unit(si), told if len(told) <= _TOLD else [], missing)
+    return Slider(own.path, low, high, value, reading.unit(si), told, missing)

@@ -155,12 +155,12 @@ def _along(library: Library, study_id: str, study: Study, related: Sequence[Rela
     return Question(text, answer, f"/studies/{relative.record.id}")
 
 
-def _headline(library: Library, relative: Relative, point: str | None = None) -> Headline | None:
+def _headline(library: Library, relative: Relative) -> Headline | None:
     """The headline of a relative; None of one whose answer takes long, or has none."""
     if not is_small(relative.study):
         return None
     try:
-        return headline_of(library, relative.record.id, point=point)
+        return headline_of(library, relative.record.id)
     except FaultError:
         return None
 
