@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from sprag.service.reading.reader import Choice, Reading
-from sprag.service.views.headline import Headline, headline_of
+from sprag.service.spec.document import parse_spec
+from sprag.service.views.headline import Headline, headline_of, is_small
 from sprag.service.views.library import Library, reading_of
 from sprag.worker import models
 from sprag.worker.models import ChunkResult
@@ -111,6 +112,15 @@ def test_a_batch_tells_its_spread_and_yield_at_one_place(service: Service) -> No
     assert headline.said(reading).startswith("At 0.1 N·m half of the drives run faster than 9")
     both, _ = found(service, study_id, "0.2 N*m")
     assert [text.said(reading)[:12] for text in both.sentence] == ["No case was ", "At 0.1 N·m h", "At 0.3 N·m h"]
+
+
+def test_a_headline_that_takes_long_is_found_elsewhere() -> None:
+    base = {name: value for name, value in SPEC.items() if name not in {"axes", "combine", "exclude"}}
+    curve = parse_spec({**base, "axes": [{"path": "shaft.load", "linspace": [0, 1, 4096]}]}).study
+    batch = parse_spec({**base, **BATCH, "drives": 2048}).study
+    assert curve.cases <= batch.cases
+    assert is_small(curve)
+    assert not is_small(batch)
 
 
 def test_a_single_case_and_studies_that_have_nothing_yet(service: Service) -> None:
