@@ -171,8 +171,8 @@ def test_views_of_a_regime_follow_its_motion(service: Service, started: str, par
     page = service.http.get(case, params=asked)
     assert "It is not computed here." in page.text
     assert page.status_code == 409
-    _, _study, number, view, _chosen, start, *_ = service.computer.calls[-1]
-    assert (number, view.about.name, start) == (1, part, 5)
+    _, _study, number, views, _chosen, start, *_ = service.computer.calls[-1]
+    assert (number, views[0].about.name, start) == (1, part, 5)
 
 
 def test_a_study_begins_at_the_end_of_a_case(service: Service, started: str, monkeypatch: pytest.MonkeyPatch) -> None:
