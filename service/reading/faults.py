@@ -6,22 +6,25 @@ of its code (`sprag.service.fault_meanings`).
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from sprag.sentences import Sentence
 from sprag.service.fault_meanings import MEANINGS
 from sprag.service.languages import ENGLISH, current, gettext
-from sprag.service.reading.reader import shown
+from sprag.service.reading.quantities import Units
+from sprag.service.reading.reader import said
 from sprag.service.reading.wording import unit_text
 
 if TYPE_CHECKING:
     from sprag.service.faults import Fault
+    from sprag.service.reading.reader import Reading
 
 
-def fault_text(fault: Fault) -> str:
-    """What is wrong, without its place and value."""
+def fault_text(fault: Fault, reading: Reading | None = None) -> str:
+    """What is wrong, without its place and value; by code names where no study is read. Its units are not converted."""
     if is_translated(fault):
-        return translated(fault.message)
+        return translated(fault.message, reading and replace(reading, units=Units()))
     meaning = MEANINGS.get(fault.code)
     return gettext(meaning).removesuffix(".") if meaning else fault.message
 
@@ -41,11 +44,11 @@ def value_text(value: object) -> object:
     return translated(value) if isinstance(value, Sentence) else value
 
 
-def translated(text: str) -> str:
-    """A sentence, or a text of the catalogue, in the reader's language; in English as programs have it."""
-    if current() == ENGLISH:
+def translated(text: str, reading: Reading | None = None) -> str:
+    """A sentence, or a text of the catalogue, in the reader's language and words; in English as programs have it."""
+    if reading is None and current() == ENGLISH:
         return text
-    return shown(text) if isinstance(text, Sentence) else gettext(text)
+    return said(text, reading) if isinstance(text, Sentence) else gettext(text)
 
 
 def message(item: Fault) -> str:

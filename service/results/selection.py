@@ -216,4 +216,4 @@ def value_of(path: str, text: str, unit: str, parameter: str = "at") -> float:
 
 def of_name(name: str, message: str) -> Sentence:
     """A message about the value of a name."""
-    return Sentence("{name} {message}", name=name, message=message)
+    return Sentence("{name} {message}", name=Name(name), message=message)

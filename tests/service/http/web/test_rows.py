@@ -362,3 +362,16 @@ def test_points_have_what_rows_are_sorted_by_upwards(filled: tuple[Service, str]
         for name, part in re.findall(r'<select name="([xy])">(.*?)</select>', text)
     }
     assert chosen == {"x": ["shaft.load"], "y": ["shaft.speed.mean"]}
+
+
+@pytest.mark.parametrize(
+    ("language", "told"),
+    [("en", "Mean shaft speed is in 'kg'"), ("uk", "Середня швидкість вала")],
+)
+def test_a_wrong_condition_names_the_result_as_the_page_does(
+    filled: tuple[Service, str], language: str, told: str
+) -> None:
+    service, study_id = filled
+    address = f"/studies/{study_id}/rows?where=shaft.speed.mean%3E%3D1+kg"
+    page = html.unescape(read(service, address, 422, **{"Accept-Language": language}))
+    assert told in page.partition('role="alert"')[2].partition("</div>")[0]
