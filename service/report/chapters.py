@@ -21,7 +21,6 @@ from sprag.service.reading.part_names import lower_first, upper_first
 from sprag.service.reading.reader import CODES, shown, term, titled
 from sprag.service.reading.wording import number, unit_text, words
 from sprag.service.report.blocks import Block, Image, Section, Table, Text
-from sprag.service.report.conditions import in_captions
 from sprag.service.report.drawn import chosen_image, drawing_images, image, map_images
 from sprag.service.report.facts import facts_of
 from sprag.service.results.defaults import caption, varying_axes
@@ -31,6 +30,7 @@ from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.regimes import counted, left_out
 from sprag.service.results.rounds import sentence
 from sprag.service.results.shown_inputs import choice_name, in_words, run_settings
+from sprag.service.results.varied import in_captions
 from sprag.service.views.study_questions import CHAPTERS
 from sprag.worker import models
 from sprag.worker.planning.calibrate.plan import CALIBRATE
@@ -220,7 +220,7 @@ def _value(report: Report, item: Input) -> str:
     if item.origin == "axes":
         return _("varies")
     if item.origin == "derived":
-        return in_captions(report, str(item.value))
+        return in_captions(str(item.value), report.names, report.reading)
     value = report.reading.value(in_words(item), item.unit)
     return value if isinstance(value, str) else number(value, _DIGITS)
 
@@ -238,7 +238,8 @@ def _place(report: Report, path: str) -> str:
 
 def _text(report: Report, text: str) -> str:
     """What was given: a choice in words."""
-    return gettext(words(text)) if re.fullmatch("[a-z]+(_[a-z]+)*", text) else in_captions(report, text)
+    choice = re.fullmatch("[a-z]+(_[a-z]+)*", text)
+    return gettext(words(text)) if choice else in_captions(text, report.names, report.reading)
 
 
 def _further(report: Report) -> Iterator[Block]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -31,6 +30,7 @@ from sprag.service.results.key_answers import answers_query, find_answers, usual
 from sprag.service.results.refined import curve_plan
 from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.sensitivity import Sensitivity, sensitivity
+from sprag.service.results.varied import names_in_files
 from sprag.service.views.curves import completed_query
 from sprag.service.views.headline import headline_of
 from sprag.service.views.study_questions import ReportQuestion
@@ -222,8 +222,7 @@ class Report:
     @cached_property
     def names(self) -> frozenset[str]:
         """The names of parameters and results in files, those of all parts with ``*`` too."""
-        known = {item.path for item in self.inputs} | {info.name for info in self.infos}
-        return frozenset({*known, *(re.sub(r"\.\d+", ".*", name) for name in known)})
+        return names_in_files([*(item.path for item in self.inputs), *(info.name for info in self.infos)])
 
     @property
     def given(self) -> dict[str, str]:

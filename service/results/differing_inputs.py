@@ -3,33 +3,56 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.answers.differing import differing
+from sprag.sentences import Amount, Name
 from sprag.service.exports.inputs import inputs as every_input
 from sprag.service.languages import N_
 from sprag.service.languages import gettext as _
 from sprag.service.reading.catalogue import shown_values, unit_of
-from sprag.service.reading.reader import model_title, plural
-from sprag.service.reading.wording import number, unit_text
+from sprag.service.reading.part_names import part_name, upper_first
+from sprag.service.reading.reader import Phrase, joined, model_title, plural, shown, term
+from sprag.service.reading.wording import number, typed_text, unit_text
+from sprag.service.results.calibration import plan_of
+from sprag.service.results.fronts import goal_of
 from sprag.service.results.shown_inputs import choice_name, in_words, run_settings
+from sprag.service.results.varied import in_captions, names_in_files, varied, with_tolerance
+from sprag.service.spec.described import Described
+from sprag.service.spec.kinds.calibrate import CALIBRATE as CALIBRATION
+from sprag.service.spec.kinds.goal import GOAL as SEARCH
+from sprag.service.spec.kinds.refine import REFINE as REFINEMENT
+from sprag.worker import models
+from sprag.worker.directions import SWEEP, direction
+from sprag.worker.planning.calibrate.plan import CALIBRATE
+from sprag.worker.planning.goals.plan import GOAL
+from sprag.worker.planning.refine_plan import REFINE, RefinePlan
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 
     from sprag.service.exports.inputs import Input
     from sprag.service.reading.reader import Reading
+    from sprag.service.results.varied import Text
+    from sprag.worker.planning.goals.plan import Goal, Limit
     from sprag.worker.study import Axis, Study
 
 #: Characters of an input in the table.
 _LONGEST: Final = 120
-#: Of an axis with more values, the first ones and the last are listed.
+#: Values of an axis that are listed, and those that are where the ends and numbers of values are the same.
+_LISTED: Final = 5
 _MOST_VALUES: Final = 12
 _DIGITS: Final = 8
-#: Parts of a spec that are shown as what the study has of them, defaults included.
-_READ: Final = frozenset({"axes", "base", "combine", "derive", "model", "run"})
-_COMBINED: Final = {"grid": N_("every combination (grid)"), "zip": N_("value by value (zip)")}
+#: Parts of a spec that are read from the study, defaults included.
+_READ: Final = frozenset({
+    "sprag", "name", "notes", "tags", "axes", "base", "combine", "derive", "model", "run",
+    "goal", "refine", "calibrate", "tolerances",
+})  # fmt: skip
+#: Settings of a study that chooses its own cases, by its part of the spec.
+_SETTINGS: Final = {"refine": REFINEMENT, "goal": SEARCH, "calibrate": CALIBRATION}
+#: How drives are drawn.
+_DRAWS: Final = frozenset({"seed", "draws"})
 _NONE: Final = "–"
 
 
@@ -44,82 +67,183 @@ class DifferingInput:
 
 @dataclass(frozen=True, slots=True)
 class ReadStudy:
-    """A study with its spec, and how its numbers and names are read: in its own units, by the names of its model."""
+    """A study with its spec, what it is in words, and how it is read: in its own units, by the names of its model."""
 
     study: Study
     spec: Mapping[str, Any]
     reading: Reading
+    about: Phrase
 
 
 @dataclass(frozen=True, slots=True)
 class _Cell:
-    """An input of one study: what it is called there, what it is compared by (None where it varies), and its text."""
+    """An input of one study: what it is called there, what it is compared by, its text, and a longer one."""
 
     caption: str
     value: object
     text: str
+    full: str = ""
 
 
 def differing_inputs(compared: Sequence[ReadStudy]) -> list[DifferingInput]:
-    """Axes, model, machine and run of the studies as their pages show them, other inputs as they were written."""
-    rows = [row for part in (_axes, _general, _machine, _run) for row in _rows([dict(part(one)) for one in compared])]
-    for pointer, values in differing([one.spec for one in compared]).items():
-        path = pointer[1:].replace("/", ".").replace("~1", "/").replace("~0", "~")
-        if pointer.split("/")[1] not in _READ:
-            rows.append(DifferingInput(path, path, [_written(value) for value in values]))
-    return rows
+    """What the studies are, their machines with what varies, what they search or refine, their runs."""
+    shared = frozenset[str].intersection(*(frozenset(one.spec) for one in compared))
+    parts = (_general, _machine, _asked, partial(_settings, shared=shared), _run, partial(_further, shared=shared))
+    return list(_merged(row for part in parts for row in _rows([dict(part(one)) for one in compared])))
+
+
+def _merged(rows: Iterable[DifferingInput]) -> Iterator[DifferingInput]:
+    """Rows with one caption of which no study has two, such as the crank of different mechanisms, are one row."""
+    found: dict[str, list[DifferingInput]] = {}
+    for row in rows:
+        alike = found.setdefault(row.caption, [])
+        for place, other in enumerate(alike):
+            if all(_NONE in pair for pair in zip(row.values, other.values, strict=True)):
+                both = [b if a == _NONE else a for a, b in zip(other.values, row.values, strict=True)]
+                alike[place] = replace(other, values=both)
+                break
+        else:
+            alike.append(row)
+    return (row for alike in found.values() for row in alike)
 
 
 def _rows(cells: Sequence[Mapping[str, _Cell]]) -> Iterator[DifferingInput]:
-    """The inputs, by path of each study, that are not the same in all of them; the axes say what only varies."""
+    """The inputs, by path of each study, that are not the same in all of them."""
     for path in dict.fromkeys(path for own in cells for path in own):
         found = [own.get(path) for own in cells]
         values = [None if cell is None else cell.value for cell in found]
-        if any(value != values[0] for value in values):
-            captions = dict.fromkeys(cell.caption for cell in found if cell is not None)
-            yield DifferingInput(path, " / ".join(captions), [_NONE if cell is None else cell.text for cell in found])
-
-
-def _axes(one: ReadStudy) -> Iterator[tuple[str, _Cell]]:
-    """What varies."""
-    for axis in one.study.axes:
-        name = " = ".join(axis.paths)
-        caption = _("{name}, varied", name=one.reading.caption(name))
-        yield name, _Cell(caption, axis.array.tobytes(), _values(one.study, axis, one.reading))
-
-
-def _values(study: Study, axis: Axis, reading: Reading) -> str:
-    unit, values = unit_of(study, axis.paths[0]), shown_values(study, axis)
-    shown = [number(reading.value(value, unit), _DIGITS) for value in values.tolist()]
-    if len(shown) > _MOST_VALUES:
-        shown = [*shown[: _MOST_VALUES - 2], "…", shown[-1]]
-    text = f"{'; '.join(shown)} {unit_text(reading.unit(unit))}".strip()
-    if values.size <= _MOST_VALUES:
-        return text
-    return f"{text} ({reading.say(plural('{count} value', '{count} values', values.size))})"
+        if all(value == values[0] for value in values):
+            continue
+        captions = dict.fromkeys(cell.caption for cell in found if cell is not None)
+        texts = [_NONE if cell is None else cell.text for cell in found]
+        if len(set(texts)) < len({repr(value) for value in values}):  # different ones are told apart
+            texts = [_NONE if cell is None else cell.full or cell.text for cell in found]
+        yield DifferingInput(path, " / ".join(captions), texts)
 
 
 def _general(one: ReadStudy) -> Iterator[tuple[str, _Cell]]:
-    """The model, and how several axes go together."""
-    yield "model", _Cell(_("Model"), one.study.model, model_title(one.study.model))
-    if len(one.study.axes) > 1:
-        how = one.study.combine
-        yield "combine", _Cell(_("Combine"), how, _(_COMBINED[how]))
+    """The model, what the study is and how several axes go together, and which axis is swept."""
+    study, reading = one.study, one.reading
+    yield "model", _Cell(_("Model"), study.model, model_title(study.model))
+    about = upper_first(reading.say(one.about))
+    if study.combine == "zip" and study.plan is None:
+        about = ", ".join(filter(None, (about, _("value by value"))))
+    yield "study", _Cell(_("Kind of study"), about, about or _NONE)
+    if study.sweep is not None:
+        ways = [value for axis in study.axes if SWEEP in axis.paths for value in axis.array.tolist()]
+        text = reading.say(joined(", ", (term(direction(value)) for value in ways)))
+        yield "sweep", _Cell(_("Swept"), (study.sweep, ways), f"{reading.caption(study.sweep)}: {text}")
 
 
 def _machine(one: ReadStudy) -> Iterator[tuple[str, _Cell]]:
-    """Numbers and choices of the machine."""
-    for item in every_input(one.study, one.spec):
-        caption = one.reading.caption(item.path) if item.unit else choice_name(item)
-        yield f"base.{item.path}", _Cell(caption, item.value, _text(item, one.reading))
+    """What varies, the other numbers, and the choices of the machine, each with its tolerance."""
+    study, reading = one.study, one.reading
+    axes = {axis.paths: axis for axis in study.axes} if study.plan is None else {}
+    known, every = set[str](), every_input(study, one.spec)
+    for paths, ends in varied(study):
+        text: Text = ends
+        full, value = "", str(joined("", [ends])).encode()
+        if (axis := axes.get(paths)) is not None:
+            listed = _values(study, axis, reading)
+            text, full, value = (listed if len(axis) <= _LISTED else ends), listed, axis.array.tobytes()
+        for path in paths:
+            known.add(path)
+            yield path, _toleranced(one, path, _Cell(reading.caption(path), value, _said(text, reading), full), text)
+    names = names_in_files(item.path for item in every)
+    for item in every:
+        if item.path not in known:
+            caption = reading.caption(item.path) if item.unit else choice_name(item)
+            text = _text(item, names, reading)
+            yield item.path, _toleranced(one, item.path, _Cell(caption, item.value, text), text)
 
 
-def _text(item: Input, reading: Reading) -> str:
+def _toleranced(one: ReadStudy, path: str, cell: _Cell, text: Text) -> _Cell:
+    """The input with the tolerance of its parameter, if it has one."""
+    tolerances = () if one.study.spread is None else one.study.spread.tolerances
+    about = next((own.about for own in tolerances if path in own.paths), None)
+    if about is None:
+        return cell
+    said = _said(with_tolerance(one.study, path, text), one.reading)
+    if (name := about.get("distribution")) is not None:
+        said = f"{said}, {shown(term(str(name)))}"
+    return replace(cell, value=(cell.value, repr(about)), text=said, full="")
+
+
+def _said(text: Text, reading: Reading) -> str:
+    return reading.say(joined("", [text]))
+
+
+def _values(study: Study, axis: Axis, reading: Reading) -> str:
+    """The values of an axis; of many the first ones and the last."""
+    unit, values = unit_of(study, axis.paths[0]), shown_values(study, axis).tolist()
+    said = [number(reading.value(value, unit), _DIGITS) for value in values]
+    if len(said) > _MOST_VALUES:
+        said = [*said[: _MOST_VALUES - 2], "…", said[-1]]
+    text = f"{'; '.join(said)} {unit_text(reading.unit(unit))}".strip()
+    if len(values) <= _MOST_VALUES:
+        return text
+    return f"{text} ({reading.say(plural('{count} value', '{count} values', len(values)))})"
+
+
+def _text(item: Input, names: Container[str], reading: Reading) -> str:
     if item.varies:
         return _("varies")
     if isinstance(item.value, str):
-        return item.value if item.origin == "derived" else str(in_words(item))
+        derived = item.origin == "derived"
+        return f"= {in_captions(item.value, names, reading)}" if derived else str(in_words(item))
     return reading.quantity(item.value, item.unit, _DIGITS)
+
+
+def _asked(one: ReadStudy) -> Iterator[tuple[str, _Cell]]:
+    """What is searched, refined or calibrated."""
+    study, reading, plan = one.study, one.reading, one.study.plan or {}
+    if plan.get("kind") == GOAL:
+        goal = goal_of(study)
+        texts = {
+            "goal.best": (N_("Goals"), [_goal(own) for own in goal.best]),
+            "goal.subject_to": (N_("Limits"), [_limit(study, own) for own in goal.subject_to]),
+        }
+        for path, (caption, said) in texts.items():
+            if said:
+                text = reading.say(joined("; ", said))
+                yield path, _Cell(_(caption), text, text)
+    elif plan.get("kind") == REFINE:
+        refined = RefinePlan.from_json(plan)
+        text = ", ".join(map(reading.caption, refined.results))
+        yield "refine.results", _Cell(_("Refined results"), text, text)
+        yield "refine.error", _Cell(_("Largest error"), refined.error, f"{number(100.0 * refined.error, 4)} %")
+    elif plan.get("kind") == CALIBRATE:
+        values = sum(len(own.values) for own in plan_of(study).measured)
+        csv = one.spec["calibrate"]["measured"]["csv"]
+        yield "calibrate.measured", _Cell(_("Measured values"), csv, number(values))
+
+
+def _goal(goal: Goal) -> Phrase:
+    name = Name(goal.name, within=True)
+    return Phrase("Largest {name}", name=name) if goal.max else Phrase("Smallest {name}", name=name)
+
+
+def _limit(study: Study, limit: Limit) -> Phrase:
+    info = next((own for own in models.study_results(study) if own.name == limit.result), None)
+    unit = models.SHARE if info is None else info.unit
+    cell = limit.value if info is None else info.cell(limit.value)
+    value = term(cell) if isinstance(cell, str) else Amount(limit.value, unit)
+    texts = {
+        "at_least": Phrase("{name} at least {value}", name=Name(limit.name), value=value),
+        "at_most": Phrase("{name} at most {value}", name=Name(limit.name), value=value),
+        "is": Phrase("{name} = {value}", name=Name(limit.name), value=value),
+    }
+    return texts[limit.kind]
+
+
+def _settings(one: ReadStudy, shared: Collection[str]) -> Iterator[tuple[str, _Cell]]:
+    """How studies of the same kind choose their cases."""
+    for part, record in _SETTINGS.items():
+        for name, field in record.fields.items() if part in shared else ():
+            if isinstance(field, Described) and field.label and name != "error":
+                given = one.spec[part].get(name, field.default)
+                text = _NONE if given is None else typed_text(str(given))
+                yield f"{part}.{name}", _Cell(_(field.label), text, text)
 
 
 def _run(one: ReadStudy) -> Iterator[tuple[str, _Cell]]:
@@ -128,9 +252,11 @@ def _run(one: ReadStudy) -> Iterator[tuple[str, _Cell]]:
         yield f"run.{item.path}", _Cell(label, str(item.value), text)
 
 
-def _written(value: object) -> str:
-    """A value of a spec as text, long lists shortened."""
-    if value is None:
-        return _NONE
-    text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
-    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} …"
+def _further(one: ReadStudy, shared: Collection[str]) -> Iterator[tuple[str, _Cell]]:
+    """What else is written; how drives are drawn only where all studies draw some."""
+    names = names_in_files([*one.study.base, *one.study.axis_paths])
+    for name, value in one.spec.items():
+        if name not in _READ and (name not in _DRAWS or name in shared):
+            written = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+            text = in_captions(written, names, one.reading)
+            yield name, _Cell(part_name(name), repr(value), text if len(text) <= _LONGEST else f"{text[:_LONGEST]} …")

@@ -81,12 +81,12 @@ def _headline(library: Library, study_id: str) -> tuple[Headline, Phrase] | None
     """The headline, and what the study is; None where it is deleted, damaged, or takes long."""
     try:
         study = library.store.studies.study(study_id)
-        return (headline_of(library, study_id), _about(study)) if is_small(study) else None
+        return (headline_of(library, study_id), about(study)) if is_small(study) else None
     except (FaultError, StoreError):
         return None
 
 
-def _about(study: Study) -> Phrase:
+def about(study: Study) -> Phrase:
     """What a study is, in words: ``mean shaft speed along load torque``."""
     asked = asked_by(study)
     if asked == "best":

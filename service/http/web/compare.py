@@ -41,6 +41,7 @@ from sprag.service.results.differing_inputs import DifferingInput, ReadStudy, di
 from sprag.service.storage.errors import StudyNotFoundError
 from sprag.service.storage.studies.listing import StudyFilter
 from sprag.service.views.library import reading_of
+from sprag.service.views.listed import about
 from sprag.worker import models
 from sprag.worker.limits import MAX_SEARCH_LENGTH
 
@@ -164,7 +165,8 @@ def _differing_inputs(context: Context, records: list[StudyRecord], choice: Choi
     if len(records) < 2:
         return []
     pairs = [(context.store.studies.study(record.id), context.store.studies.spec(record.id)) for record in records]
-    return differing_inputs([ReadStudy(study, spec, reading_for(study, spec, choice)) for study, spec in pairs])
+    read = [ReadStudy(study, spec, reading_for(study, spec, choice), about(study)) for study, spec in pairs]
+    return differing_inputs(read)
 
 
 @router.get("/compare")
