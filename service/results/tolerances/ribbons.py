@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
 #: Quantiles that are shown unless others are asked for.
 QUANTILES: Final = (0.05, 0.5, 0.95)
-#: Most quantiles of one answer.
-MOST_QUANTILES: Final = 99
 #: Drives at either end that are named.
 EXTREMES: Final = 5
 #: Probabilities at which the distribution at a single place is drawn.
