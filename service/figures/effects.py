@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def effects_figure(found: Sequence[Sensitivity], columns: int = 2) -> Figure:
-    """A panel for each result and axis, what matters most first, so many in a row."""
+    """A panel for each result and axis, what matters most first, so many in a row; of three axes all in one row."""
     panels = tuple(
         Panel(
             Quantity(item.info.name, item.info.unit),
@@ -27,4 +27,6 @@ def effects_figure(found: Sequence[Sensitivity], columns: int = 2) -> Figure:
     )
     if not panels:
         return Figure(Quantity("", "1"), (), note=Phrase("No case has these results yet."))
-    return Figure(panels[0].x or panels[0].y, panels, columns)
+    if columns > 1 and len(found[0].effects) == 3:
+        columns = 3
+    return Figure(panels[0].x or panels[0].y, panels, columns, alike=True)

@@ -181,6 +181,7 @@ class Figure:
     most : most points of a drawn line, where there are more than can be distinguished
     note : a sentence, where there is nothing to draw
     below : a sentence below the panels
+    alike : whether the panels of one quantity show the same range of it, so that they can be compared
     at : x of a line across all panels, such as the working point; pages of motions draw theirs at their slider
     log, flipped : which axes have equal factors at equal distances, and which run backwards
     """
@@ -201,6 +202,7 @@ class Figure:
     most: int = 6_000
     note: str = ""
     below: str = ""
+    alike: bool = False
     at: float | None = None
     log: tuple[Direction, ...] = ()
     flipped: tuple[Direction, ...] = ()

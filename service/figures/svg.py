@@ -205,9 +205,10 @@ class _Painting(Painting):
 
     def _y_scale(self, panel: Panel) -> Scale:
         figure = self._figure
-        values = [line.y for line in panel.lines]
-        values += [array for fill in panel.fills for array in (fill.low, fill.high)]
-        values += [marks.y for marks in panel.marks]
+        panels = [one for one in figure.panels if one.y == panel.y] if figure.alike else [panel]
+        values = [line.y for one in panels for line in one.lines]
+        values += [array for one in panels for fill in one.fills for array in (fill.low, fill.high)]
+        values += [marks.y for one in panels for marks in one.marks]
         log = "y" in figure.log
         ends = extent(values, log=log)
         scale = rounded_scale(ends, self._high, zero=figure.from_zero, log=log, unit=panel.y.unit)

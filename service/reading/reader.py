@@ -210,11 +210,11 @@ class Reading:
         return self.caption(path) if has_caption(self.model, path) else part_name(path)
 
     def say_name(self, name: str) -> str:
-        """The title of an axis: a phrase, or the name of a quantity."""
+        """The title of an axis: a phrase, or the name of a quantity; a Greek letter is a symbol and stays as it is."""
         if not isinstance(name, Phrase):
             return self.caption(name)
         text = name.said(self)
-        return f"{text[:1].upper()}{text[1:]}"
+        return text if "α" <= text[:1] <= "ω" else f"{text[:1].upper()}{text[1:]}"
 
     def unit(self, si: str) -> str:
         """The unit in which quantities of that SI unit are shown."""

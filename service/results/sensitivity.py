@@ -212,6 +212,7 @@ def _of_result(
     sample: Mapping[str, Any] | None,
 ) -> Sensitivity:
     kinds: list[str] = []
+    without = int((~np.isfinite(y)).sum())
     y = _settled_only(y, usable, regimes, kinds)
     known = np.isfinite(y)
     cases, missing = int(known.sum()), int((~known).sum())
@@ -223,12 +224,12 @@ def _of_result(
     columns = np.stack([axis.array[every[at]] for axis, at in zip(varying, positions, strict=True)], axis=1)
     notes: list[str] = []
     method: Method
-    if missing:
+    if without:
         notes.append(
             plural(
                 "{count} case without this result is left out",
                 "{count} cases without this result are left out",
-                missing,
+                without,
             )
         )
     if not cases:

@@ -16,7 +16,7 @@ from sprag.service.languages import N_
 from sprag.service.reading.reader import Phrase, joined, plural
 from sprag.service.results.defaults import drawn_results, varying_axes
 from sprag.service.results.selection import numeric_names, numeric_results
-from sprag.service.results.sensitivity import Sensitivity, sensitivity
+from sprag.service.results.sensitivity import Sensitivity, in_order, sensitivity
 from sprag.service.results.sensitivity_indices import Indices
 from sprag.service.views.branch import named
 from sprag.service.views.setting import Offered
@@ -128,14 +128,14 @@ def _tables(item: Sensitivity) -> Iterator[ShownTable]:
     else:
         title = Phrase("Shares of the variance of {name}", name=name)
         columns = tuple(
-            Column(Phrase(text), "1", 3)
+            Column(Phrase(text), models.SHARE, 3)
             for text in (N_("Alone"), "±", N_("With what it does together with others"), "±")
         )
         values = ("first_order", "first_order_error", "total", "total_error")
     names = [joined(" = ", map(Name, effect.paths)) for effect in item.effects]
     rows = [
-        [own, *(getattr(effect.indices, value) for value in values)]
-        for own, effect in zip(names, item.effects, strict=True)
+        [joined(" = ", map(Name, effect.paths)), *(getattr(effect.indices, value) for value in values)]
+        for effect in in_order(item)
     ]
     yield ShownTable(title, (Column(Phrase("Parameter")), *columns), rows)
     if item.pairs:
@@ -143,8 +143,8 @@ def _tables(item: Sensitivity) -> Iterator[ShownTable]:
         heads = (
             Column(Phrase("Parameter")),
             Column(Phrase("with")),
-            Column(Phrase("Share"), "1", 3),
-            Column(Phrase("±"), "1", 2),
+            Column(Phrase("Share"), models.SHARE, 3),
+            Column(Phrase("±"), models.SHARE, 2),
         )
         yield ShownTable(Phrase("Interactions of two, on {name}", name=name), heads, pairs)
 

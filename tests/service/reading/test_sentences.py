@@ -191,3 +191,7 @@ def test_a_problem_is_a_sentence_in_every_language(error: Exception, english: st
     assert problem.detail == english
     with language("uk"):
         assert told(problem.detail) == ukrainian
+
+
+def test_greek_letters_are_symbols_in_titles() -> None:
+    assert [DRIVE.say_name(Phrase(text)) for text in ("μ*", "share", "зсув")] == ["μ*", "Share", "Зсув"]

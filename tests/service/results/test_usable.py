@@ -17,6 +17,7 @@ from sprag.service.results.curves import CurveQuery
 from sprag.service.results.differences import differences
 from sprag.service.results.joined import joined_points
 from sprag.service.results.key_answers import answers_query, find_answers
+from sprag.service.results.regimes import left_out
 from sprag.service.results.sensitivity import sensitivity
 from sprag.service.results.tolerances.batch import Asked
 from sprag.service.results.tolerances.yields import yields
@@ -185,6 +186,7 @@ def test_sensitivities_and_explore_leave_out_what_does_not_count(service: Servic
     fetch = partial(service.store.rows.for_cases, study_id)
     (found,) = sensitivity(study, service.store.studies.spec(study_id), [SPEED], fetch)
     assert (found.cases, found.missing) == (1, 2)
+    assert [note for note in found.notes if "left out" in note] == [left_out(2)], "told once"
     rows = service.get(f"/studies/{study_id}/explore", show=SPEED)["cases"]
     assert [row["results"][SPEED] is None for row in sorted(rows, key=lambda row: row["case"])] == [False, True, True]
     assert [row["flags"] for row in sorted(rows, key=lambda row: row["case"])][1] == ["not_settled"]
