@@ -171,6 +171,18 @@ def yield_figure(found: Yield) -> Figure:
     )
 
 
+def batch_figure(found: Ribbon, reached: Yield | None) -> Figure:
+    """The quantiles of results, and below them the yield over the same axis, where there is an axis and a yield."""
+    figure = replace(ribbon_figure(found), below="")
+    if reached is None or reached.places.x is None:
+        return figure
+    (panel,) = yield_figure(reached).panels
+    lines = tuple(replace(line, listed=False) for line in panel.lines)
+    fills = tuple(replace(fill, listed=False) for fill in panel.fills)
+    good = replace(panel, y=Quantity(Phrase("yield, with its 95 % interval"), "%"), lines=lines, fills=fills)
+    return replace(figure, panels=(*figure.panels, good))
+
+
 def ribbon_map(found: Ribbon, probability: float) -> Map:
     """A quantile of one result over x and the axis of the lines; raises SelectionError where there is no such axis."""
     if len(found.results) != 1:

@@ -14,7 +14,7 @@ from sprag.service.results.defaults import drawn_results
 from sprag.service.results.tolerances.batch import Asked
 from sprag.service.results.tolerances.conditions import first_condition
 from sprag.service.results.tolerances.ribbons import QUANTILES, ribbon
-from sprag.service.results.tolerances.told import at_line, causes_sentences, yield_sentences
+from sprag.service.results.tolerances.told import at_line, causes_sentences, worst_sentences, yield_sentence
 from sprag.service.results.tolerances.yields import yields
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def drives_part(study: Study, infos: Sequence[ResultInfo], fetch: Fetch) -> Driv
     sentences: list[str] = [plural("{count} drive was drawn.", "{count} drives were drawn.", study.drives)]
     for one, line in zip(drawn.lines, reached.lines, strict=True):
         at = at_line(drawn.places, line.line)
-        parts = [*yield_sentences(line, reached.conditions[0].text)]
+        parts = [yield_sentence(line, reached.conditions[0].text), *worst_sentences(line)]
         parts += [text for name in names for text in causes_sentences(study, one.spreads[name].causes, name)]
         sentences += [joined(": ", (at, text)) if at else text for text in parts]
     return DrivesPart(ribbon_figure(drawn), _("Quantiles over the drives"), tuple(sentences))

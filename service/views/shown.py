@@ -41,10 +41,11 @@ class ShownTable:
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """Sentences, and tables."""
+    """Sentences, tables that are folded where there are several, and tables that are open in any case."""
 
     sentences: Sequence[str] = ()
     tables: Sequence[ShownTable] = ()
+    opened: Sequence[ShownTable] = ()
 
 
 #: Nothing beside the figure.

@@ -286,7 +286,7 @@ class YieldQuestion:
             least=1,
             metavar="CONDITION",
             positional=True,
-            label=N_("What a good drive reaches, one condition on a line"),
+            label=N_("What a good drive reaches"),
         ),
     ]
     x: LineAlong = None

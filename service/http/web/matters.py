@@ -13,6 +13,7 @@ from starlette.datastructures import QueryParams
 from starlette.responses import RedirectResponse, Response
 
 from sprag.service.faults import Fault, FaultError, SelectionError
+from sprag.service.figures.ribbons import batch_figure
 from sprag.service.http.context import ID_PATTERN, Context, Ctx, StudyId
 from sprag.service.http.current import current
 from sprag.service.http.problems import ApiError, api_error
@@ -23,6 +24,14 @@ from sprag.service.http.views import study_address
 from sprag.service.http.web import calibrate
 from sprag.service.http.web.figures.drawn import cases_of
 from sprag.service.http.web.form.values import Form
+from sprag.service.http.web.good_drives import (
+    PARTS,
+    RELATIONS,
+    condition_rows,
+    condition_texts,
+    results_of,
+    without_rows,
+)
 from sprag.service.http.web.held import fixed_choices, with_held
 from sprag.service.http.web.study import study_frame
 from sprag.service.http.web.templates import page
@@ -32,10 +41,12 @@ from sprag.service.jobs import checks
 from sprag.service.jobs.submission import take_in
 from sprag.service.languages import N_
 from sprag.service.results.choice import held
+from sprag.service.results.headlines.batch import with_yield
 from sprag.service.results.headlines.headline import Headline
 from sprag.service.results.headlines.influence import influence_headline
-from sprag.service.results.tolerances.yields import Yield
 from sprag.service.spec.stored import accepted
+from sprag.service.views.batch import batch_shown
+from sprag.service.views.drives import RibbonView
 from sprag.service.views.headline import headline_of
 from sprag.service.views.library import reading_of
 from sprag.service.views.sensitivity import SensitivityView
@@ -50,13 +61,14 @@ if TYPE_CHECKING:
     from sprag.service.jobs.submission import Submission
     from sprag.service.reading.reader import Choice
     from sprag.service.views.library import Library
-    from sprag.service.views.study_view import StudyView
     from sprag.worker.study import Study
 
 router = page_router()
 
-#: The views that answer each question, the first with its sentence and its chart.
+#: The views that answer each question together.
 ASKS: Final = {"sensitivity": ("sensitivity",), "tolerances": ("ribbon", "yield"), "measurement": ("calibration",)}
+#: What the views of a question are called beside their files.
+_PARTS: Final = {"ribbon": N_("Spread"), "yield": N_("Yield")}
 #: How to get the answer to a question that a study has none to.
 _HOW: Final = {
     "sensitivity": N_("Nothing varies in this study, so nothing can be said about what matters."),
@@ -67,31 +79,35 @@ OLD: Final = {"sensitivity": "sensitivity", "drives": "tolerances", "calibration
 
 
 def seen(
-    library: Library,
-    study_id: str,
-    view: StudyView[Any, Any, Any],
-    chosen: Any,
-    choice: Choice,
-    cases: str,
-    *,
-    first: bool,
+    library: Library, study_id: str, asked: Mapping[str, Any], choice: Choice, cases: str
 ) -> tuple[Seen, Headline]:
-    """Find the view of a study, draw it and say what people read of it; the headline of the ``first`` one."""
-    answer = StudyAnswer(library, study_id, chosen, view.find(library, study_id, chosen))
-    shown, head = view.shown(answer), Headline()
-    if first and isinstance(view, SensitivityView):
+    """Find the views of a study that are ``asked``, by name, draw them as one figure, and say what people read."""
+    views = [(STUDY_VIEWS[name], chosen) for name, chosen in asked.items()]
+    answers = [StudyAnswer(library, study_id, chosen, view.find(library, study_id, chosen)) for view, chosen in views]
+    (view, _), answer = views[0], answers[0]
+    if isinstance(view, SensitivityView):
         head = influence_headline(answer.study, answer.result[0])
-    elif first:
+    else:
         head = headline_of(library, study_id)
-    if isinstance(answer.result, Yield) and answer.result.places.x is None:
-        return Seen(shown=shown), head
-    reading = reading_of(library.store, study_id, choice)
-    return inline(view.drawn_in(answer, 2), reading, shown, cases), head
+    if isinstance(view, RibbonView):
+        reached = answers[1].result if len(answers) > 1 else None
+        figure, shown = batch_figure(answer.result, reached), batch_shown(answer.result, reached)
+        head = head if reached is None else with_yield(head, reached)
+    else:
+        figure, shown = view.drawn_in(answer, 2), view.shown(answer)
+    return inline(figure, reading_of(library.store, study_id, choice), shown, cases, broad=True), head
 
 
 @router.get("/studies/{study_id:study}/matters")
 async def matters_page(work: Attended, study_id: StudyId, ask: Annotated[str, Query(max_length=20)] = "") -> Response:
     """The answer to a question about a study, by default to the first that it has one to."""
+    context, given = work.context, work.request.query_params
+    study = await in_thread(context.store.studies.study, study_id)
+    reading = await in_thread(reading_of, context.store, study_id, current().choice)
+    texts = condition_texts(given, study, reading)
+    if texts is not None:
+        query = urlencode(without_rows(given, texts))
+        return RedirectResponse(f"/studies/{study_id}/matters?{query}", status_code=303)
     return await answered(work, study_id, ask)
 
 
@@ -108,26 +124,32 @@ async def answered(
         raise ApiError("not-found", "There is no such question.")
     reading = await in_thread(reading_of, context.store, study_id, current().choice)
     params = _places(study, with_held(work.request.query_params, study, reading))
-    opened: list[tuple[Asked, Seen | None]] = []
-    cases = cases_of(study_id)
-    head = Headline()
-    for place, name in enumerate(ASKS[ask] if ask in known else ()):
-        view = STUDY_VIEWS[name]
-        asked = asked_of(view.about, params, view.offered(study), partial(view.choose, study))
-        found = None
-        try:
-            if asked.ready:
-                shown = context.library, study_id, view, asked.chosen, current().choice, cases
-                found, own = await work.check(partial(seen, first=not place), *shown)
-                head = own if not place else head
-        except SelectionError as error:
-            asked = replace(asked, faults=error.faults)
-        except FaultError as error:
-            found, status = Seen(note=error.detail), api_error(error).type.status
-        opened.append((asked, found))
-    if any(asked.faults for asked, _found in opened):
+    every = [_asked(study, name, params) for name in (ASKS[ask] if ask in known else ())]
+    ready = {one.about.name: one.chosen for one in every if one.ready}
+    found, head = None, Headline()
+    try:
+        if every and every[0].ready:
+            found, head = await work.check(seen, context.library, study_id, ready, current().choice, cases_of(study_id))
+    except SelectionError as error:
+        every[0] = replace(every[0], faults=error.faults)
+    except FaultError as error:
+        found, status = Seen(note=error.detail), api_error(error).type.status
+    if any(one.faults for one in every):
         status = 422
-    return await in_thread(_page, context, study_id, study, ask, known, opened, head, status, (pasted or {}, faults))
+    return await in_thread(_page, context, study_id, study, ask, known, every, found, head, status,
+                           (pasted or {}, faults))  # fmt: skip
+
+
+def _asked(study: Study, name: str, params: QueryParams) -> Asked:
+    """What an address asks of a view, with the faults of what the study has not."""
+    view = STUDY_VIEWS[name]
+    asked = asked_of(view.about, params, view.offered(study), partial(view.choose, study))
+    try:
+        if asked.ready:
+            view.check(study, asked.chosen)
+    except SelectionError as error:
+        return replace(asked, faults=error.faults, ready=False)
+    return asked
 
 
 def _places(study: Study, params: QueryParams) -> QueryParams:
@@ -143,13 +165,15 @@ def _places(study: Study, params: QueryParams) -> QueryParams:
 
 def _page(
     context: Context, study_id: str, study: Study, ask: str, known: Sequence[str],
-    opened: list[tuple[Asked, Seen | None]], head: Headline, status: int,
+    every: Sequence[Asked], found: Seen | None, head: Headline, status: int,
     new: tuple[Mapping[str, str], Sequence[Fault]],
 ) -> Response:  # fmt: skip
     frame = study_frame(context, study_id)
     reading, cases = frame["reading"], f"/studies/{study_id}/cases/"
-    places = dict(text.partition("=")[::2] for asked, _ in opened[:1] for name, text in asked.pairs if name == "at")
-    drawn = tuple(text for asked, _ in opened[:1] for name, text in asked.pairs if name in ("x", "by"))
+    pairs = every[0].pairs if every else []
+    places = dict(text.partition("=")[::2] for name, text in pairs if name == "at")
+    drawn = tuple(text for name, text in pairs if name in ("x", "by"))
+    conditions = [text for asked in every for name, text in asked.pairs if name == "condition"]
     fixed = fixed_choices(study, drawn, tuple(places.items()), reading) if ask == "tolerances" else []
     address = study_address(study_id)
     paste = calibrate.fields(context, study_id, *new) if ask == "measurement" and ask not in known else None
@@ -163,9 +187,18 @@ def _page(
         how=_HOW.get(ask, ""),
         head=head.said(reading),
         numbers=[fact_of(one, reading, cases) for one in head.numbers],
-        opened=[(*one, files_of(f"{address}/{one[0].about.name}", one[0], file_pairs())) for one in opened],
+        asked=every,
+        found=found,
+        files=[
+            (_PARTS.get(one.about.name, ""), files_of(f"{address}/{one.about.name}", one, file_pairs()))
+            for one in every
+        ],
+        conditions=condition_rows(conditions, study),
+        relations=RELATIONS,
+        parts=PARTS,
+        results=results_of(study),
         fixed=[one for one in fixed if one["path"] != DRIVE],
-        asks_more=any(one.asked.setting.label for asked, _ in opened for one in asked.fields),
+        asks_more=any(one.asked.setting.label for asked in every for one in asked.fields),
         cases=cases,
         paste=paste,
         saves=next((old for old, own in OLD.items() if own == ask and old != "calibration"), ""),

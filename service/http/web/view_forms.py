@@ -102,15 +102,15 @@ class Seen:
     frames: Mapping[str, Any] | None = None
 
 
-def inline(figure: Figure, reading: Reading, shown: Shown, cases: str) -> Seen:
+def inline(figure: Figure, reading: Reading, shown: Shown, cases: str, *, broad: bool = False) -> Seen:
     """A view with a figure, as its reader reads it; the sentence below it only where none beside it says the same.
 
-    ``cases`` is the address of the cases of its points, which their numbers follow.
+    ``cases`` is the address of the cases of its points, which their numbers follow; ``broad`` as of `drawn`.
     """
     read = read_figure(figure, reading)
     if any(read.below in reading.say(text) for text in shown.sentences):
         read = replace(read, below="")
-    return Seen(drawn(read, cases=cases), shown)
+    return Seen(drawn(read, cases=cases, broad=broad), shown)
 
 
 def asked_of(

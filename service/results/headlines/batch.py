@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -38,10 +38,11 @@ if TYPE_CHECKING:
 
     from sprag.service.results.curves import CurveQuery, Fetch
     from sprag.service.results.tolerances.ribbons import Ribbon, RibbonLine
-    from sprag.service.results.tolerances.yields import Yield
+    from sprag.service.results.tolerances.yields import Yield, YieldLine
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Study
 
+_YIELD: Final = Phrase("Yield")
 _LOW, _MIDDLE, _HIGH = range(len(QUANTILES))
 
 
@@ -140,23 +141,31 @@ def _numbers(found: Ribbon, line: RibbonLine, name: str, place: int, reached: Yi
     if np.isfinite(nominal):
         case = int(line.line.cases[place])
         numbers.append(KeyNumber(Phrase("As drawn"), nominal, unit, digits(nominal), where=where, case=case))
-    numbers += _yield(line, place, reached)
-    return tuple(numbers)
+    good = next((one for one in reached.lines if one.line.by == line.line.by), None)
+    return (*numbers, *(_yield(good, place, reached) if good is not None else ()))
+
+
+def with_yield(head: Headline, reached: Yield) -> Headline:
+    """The headline with the yield of these conditions at its place, where they have that place."""
+    for line in reached.lines:
+        for place in np.flatnonzero(line.line.cases == head.case).tolist():
+            others = [one for one in head.numbers if one.label != _YIELD]
+            return replace(head, numbers=(*others, *_yield(line, place, reached)))
+    return head
 
 
 def _half_width(low: float, high: float) -> float | None:
     return 0.5 * (high - low) if np.isfinite(low + high) else None
 
 
-def _yield(line: RibbonLine, place: int, reached: Yield) -> list[KeyNumber]:
-    """The share of the drives that reach the usual condition at the place."""
-    own = next((one for one in reached.lines if one.line.by == line.line.by), None)
-    if own is None or not np.isfinite(own.each.value[place]):
+def _yield(own: YieldLine, place: int, reached: Yield) -> list[KeyNumber]:
+    """The share of the drives that reach the conditions at the place."""
+    if not np.isfinite(own.each.value[place]):
         return []
     share, low, high = (float(ends[place]) for ends in (own.each.value, own.each.low, own.each.high))
     count = digits(share, 0.5 * (high - low))
-    where = reached.conditions[0].text
-    return [KeyNumber(Phrase("Yield"), share, models.SHARE, count, low, high, where=where)]
+    where = joined(", ", [one.text for one in reached.conditions])
+    return [KeyNumber(_YIELD, share, models.SHARE, count, low, high, where=where)]
 
 
 def _spread(line: RibbonLine, name: str) -> Trace | None:

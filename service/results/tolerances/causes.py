@@ -27,14 +27,26 @@ _MOST_DRIVES: Final = 20_000
 
 @dataclass(frozen=True, slots=True)
 class Causes:
-    """The share of each tolerance, in their order; None where it is not known, and a note then says why.
+    """What a spread is owed to.
 
-    ``rest`` is the share of what tolerances do together, which no single one of them has.
+    Attributes
+    ----------
+    shares : the share of each tolerance, in their order; None where it is not known
+    rest : the share of what tolerances do together, which no single one of them has; None where it is not known
+    why : why shares are not known; "" where they are
+    missing : drives that are left out of known shares, because they have no results
     """
 
     shares: tuple[Share | None, ...]
     rest: float | None
-    note: str
+    why: str = ""
+    missing: int = 0
+
+    @property
+    def note(self) -> str:
+        """Why shares are not known, and how many drives are left out."""
+        left_out = Phrase("drives without results, left out of the shares: {count}", count=self.missing)
+        return joined("; ", filter(None, (self.why, left_out if self.missing else "")))
 
 
 class Matrix:
@@ -76,15 +88,11 @@ def variance_causes(study: Study, values: Numbers) -> Causes:
             note = Phrase(text, least=LEAST_DRIVES, count=enough)
         return Causes(nothing, None, note)
     own = tuple(None if name in tied else share for name, share in zip(spread.names, found, strict=True))
-    notes = []
-    if tied:
-        names = joined(", ", (Name(name, within=True) for name in sorted(tied)))
-        notes.append(Phrase("{names} are correlated: they have no shares of their own", names=names))
-    if missing:
-        notes.append(Phrase("drives without results, left out of the shares: {count}", count=missing))
+    names = joined(", ", (Name(name, within=True) for name in sorted(tied)))
+    why = Phrase("{names} are correlated: they have no shares of their own", names=names) if tied else ""
     # Estimates of shares that are 0 scatter around it; added up they would count as interactions.
     rest = None if tied else max(1.0 - sum(max(share.value, 0.0) for share in found), 0.0)
-    return Causes(own, rest, joined("; ", notes))
+    return Causes(own, rest, why, missing)
 
 
 def correlated(study: Study) -> set[str]:

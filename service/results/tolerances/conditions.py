@@ -84,6 +84,17 @@ class Condition:
         return np.where(np.isfinite(values) & np.isfinite(bound), found, -np.inf)
 
 
+def split_condition(text: str) -> tuple[str, str, str, bool] | None:
+    """Result, sign and value of a condition as they are typed, and whether the value is per cent of the nominal one."""
+    parts = _FORM.fullmatch(plain_signs(text))
+    if parts is None:
+        return None
+    name, sign, value = parts.groups()
+    share = _PART.fullmatch(value)
+    sign = {"≥": ">=", "≤": "<="}.get(sign, sign)
+    return (name, sign, value, False) if share is None else (name, sign, share[1], True)
+
+
 def read_conditions(infos: Sequence[ResultInfo], texts: Sequence[str]) -> tuple[Condition, ...]:
     """The conditions of these texts; raises SelectionError about the parameter ``condition``."""
     texts = tuple(dict.fromkeys(texts))

@@ -1,15 +1,16 @@
-"""The nominal drive of a study with tolerances as a study of its own, for what is not about drives."""
+"""The nominal drive of a study with tolerances: as a study of its own, and how far the drawn drives are from it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from sprag.worker.spread import DRIVE
 from sprag.worker.study import without_drives
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from sprag.service.results.curves import Fetch
@@ -27,3 +28,14 @@ def nominal_only(study: Study, fetch: Fetch) -> tuple[Study, Fetch]:
         return fetch(nominal[cases], names)
 
     return without_drives(study), fetch_nominal
+
+
+def deviations(study: Study) -> NDArray[np.float64]:
+    """How far each drive is from the nominal one, shape (drives, tolerances): a share of the value, or SI."""
+    if study.spread is None:
+        raise ValueError("the study has no tolerances")
+    nominal = [
+        1.0 if one.change == "scale" else 0.0 if one.change == "offset" else study.base[one.paths[0]]
+        for one in study.spread.tolerances
+    ]
+    return np.asarray(study.spread.array - np.array(nominal))

@@ -28,29 +28,31 @@ def at_line(places: Places, line: Line) -> Phrase:
     return joined(", ", values)
 
 
-def yield_sentences(line: YieldLine, condition: str) -> Iterator[str]:
-    """The share of the drives that reach a condition, and the worst of them."""
+def yield_sentence(line: YieldLine, condition: str) -> Phrase:
+    """The share of the drives that reach a condition."""
     share = line.whole
     if not share.drives:
-        yield Phrase("No drive has been run at every place yet.")
-        return
+        return Phrase("No drive has been run at every place yet.")
     value, low, high = (_percent(float(part)) for part in (share.value, share.low, share.high))
     shares: dict[str, str] = {"value": value, "low": low, "high": high, "condition": condition}
     count = int(share.drives)
     if line.line.x:
-        yield plural(
+        return plural(
             "{value} of {count} drive (95 % interval {low} to {high}) has {condition} at every place.",
             "{value} of {count} drives (95 % interval {low} to {high}) have {condition} at every place.",
             count,
             **shares,
         )
-    else:
-        yield plural(
-            "{value} of {count} drive (95 % interval {low} to {high}) has {condition}.",
-            "{value} of {count} drives (95 % interval {low} to {high}) have {condition}.",
-            count,
-            **shares,
-        )
+    return plural(
+        "{value} of {count} drive (95 % interval {low} to {high}) has {condition}.",
+        "{value} of {count} drives (95 % interval {low} to {high}) have {condition}.",
+        count,
+        **shares,
+    )
+
+
+def worst_sentences(line: YieldLine) -> Iterator[str]:
+    """The drives with the least margins; none where none was run."""
     worst = [
         Phrase(
             "{drive} (case {case}, {margin})",

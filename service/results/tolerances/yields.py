@@ -13,6 +13,7 @@ from sprag.service.results.refined import Line
 from sprag.service.results.tolerances.batch import Asked, Places, Rows, places_of, read
 from sprag.service.results.tolerances.causes import Causes, variance_causes
 from sprag.service.results.tolerances.conditions import Condition, read_conditions
+from sprag.service.results.tolerances.nominal import deviations
 from sprag.service.results.tolerances.quantiles import Proportion, proportion
 from sprag.worker import models
 
@@ -50,6 +51,7 @@ class YieldLine:
     whole : the share of the drives that reach the conditions at every place
     nominal : bool array, shape (places,): whether the nominal drive does
     failed, pending : drives without one of the results, and those that are not run yet; shape (places,)
+    nearest : for each tolerance the share at every place of that half of the drives that is nearest to nominal in it
     causes : shares of the variance of reaching the conditions at every place
     worst : the drives with the least margins
     """
@@ -60,6 +62,7 @@ class YieldLine:
     nominal: NDArray[np.bool_]
     failed: NDArray[np.int64]
     pending: NDArray[np.int64]
+    nearest: Proportion
     causes: Causes
     worst: tuple[WorstDrive, ...]
 
@@ -116,9 +119,16 @@ def _line(places: Places, line: Line, conditions: tuple[Condition, ...], worst: 
         nominal,
         failed,
         pending,
+        _nearest(places.study, good, every),
         variance_causes(places.study, indicator),
         tuple(whole.worst(places.study, worst)),
     )
+
+
+def _nearest(study: Study, good: NDArray[np.bool_], run: NDArray[np.bool_]) -> Proportion:
+    """The share of good drives among the half of the ``run`` ones that is nearest to nominal in each tolerance."""
+    order = np.argsort(np.abs(deviations(study)[run]), axis=0, kind="stable")[: (run.sum() + 1) // 2]
+    return proportion(good[run][order].sum(axis=0), np.full(order.shape[1], len(order)))
 
 
 class _Whole:

@@ -22,13 +22,16 @@ def cases_of(study_id: str) -> str:
     return here(f"/studies/{study_id}/cases/")
 
 
-def drawn(figure: Figure, label: str = "", cases: str = "", chosen: str = "") -> Markup:
-    """A figure, already in its reader's units and words, with the sentence below it; `svg` has the parameters."""
+def drawn(figure: Figure, label: str = "", cases: str = "", chosen: str = "", *, broad: bool = False) -> Markup:
+    """A figure, already in its reader's units and words, with the sentence below it; `svg` has the parameters.
+
+    Figures of several columns, and ``broad`` ones, are drawn for a whole page as well.
+    """
     if figure.note:
         return _note(figure.note)
     single = replace(figure, columns=1)
     sizes = [("narrow", single, NARROW), ("wide", single, WIDE)]
-    if figure.columns > 1 or figure.motion:
+    if figure.columns > 1 or figure.motion or broad:
         sizes.append(("double", figure, DOUBLE))
     every = [
         _named(svg(each, width=width, label=label, cases=cases, chosen=chosen), name) for name, each, width in sizes

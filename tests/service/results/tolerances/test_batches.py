@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,8 +13,11 @@ from scipy.stats import norm
 
 from sprag.service.answers import tolerances as shapes
 from sprag.service.presets import preset_text
+from sprag.service.results.tolerances.batch import Asked
 from sprag.service.results.tolerances.conditions import first_condition
+from sprag.service.results.tolerances.yields import yields
 from sprag.service.spec.document import load_spec, parse_spec
+from sprag.worker import models
 from tests.service.conftest import API
 from tests.service.results.tolerances.conftest import DEVIATION, MEAN, SPEC, finish
 from tests.service.shapes import fits
@@ -227,6 +231,23 @@ def test_the_page_shows_ribbon_yield_and_the_worst_drives(service: Service) -> N
     assert service.http.get(f"{API}{own}/report", params={"format": "pdf"}).content.startswith(b"%PDF")
     plain = service.submit({key: value for key, value in SPEC.items() if key not in ("tolerances", "drives", "seed")})
     assert "This study has no tolerances." in service.http.get(f"/studies/{plain}/matters?ask=tolerances").text
+
+
+def test_of_the_half_nearest_to_nominal_as_many_are_good_as_the_closed_form_says(service: Service) -> None:
+    study_id = finish(service, {**SPEC, "axes": []})
+    own = service.store.studies.study(study_id)
+    found = yields(own, models.study_results(own), ["speed >= 58 m"], Asked(), 0, partial(
+        service.store.rows.for_cases, study_id))  # fmt: skip
+    (line,) = found.lines
+    # A draw of the half has a standard score of at most 0.6745; the base is 59 m.
+    score = norm.ppf(np.linspace(0.25, 0.75, 1001))
+    for place, deviation in enumerate((3.0, 2.0, 1.0)):
+        exact = norm.cdf((1.0 + deviation * score) / np.sqrt(DEVIATION**2 - deviation**2)).mean()
+        assert line.nearest.low[place] <= exact <= line.nearest.high[place]
+    assert line.nearest.drives.tolist() == [256] * 3
+    page = service.http.get(f"/studies/{study_id}/matters", params={"condition": "speed >= 58 m"}).text
+    rows = page.partition("<caption>Where the spread of ")[2].partition("</table>")[0]
+    assert f'<td class="num">{100.0 * line.nearest.value[0]:.3g}</td>' in rows
 
 
 def test_a_page_begins_with_the_side_of_the_nominal_drive_that_is_worse() -> None:
