@@ -54,7 +54,7 @@ def translated(text: str, reading: Reading | None = None) -> str:
 def message(item: Fault) -> str:
     """A fault as a sentence beside its field."""
     parts = [fault_text(item)]
-    if item.value is not None and not isinstance(item.value, list | dict):
+    if item.value not in (None, "") and not isinstance(item.value, list | dict):
         parts.append(gettext("got {value}", value=plainly(item.value)))
     if item.allowed:
         parts.append(gettext("allowed: {allowed}", allowed=unit_text(allowed_text(item.allowed))))

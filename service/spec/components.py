@@ -19,7 +19,7 @@ from sprag.service.reading.limits import characters
 from sprag.service.reading.numbers import parse_number, settled
 from sprag.service.reading.printed import could_be_several, could_be_values
 from sprag.service.reading.together import AMBIGUOUS_UNIT, questions
-from sprag.service.reading.units import QuantityError
+from sprag.service.reading.units import QuantityError, has_unit
 from sprag.service.spec.csv_text import Column, in_cell, read_csv, refuse_mixed_column, unescape
 from sprag.service.spec.described import Record
 from sprag.service.spec.labels import LINES_ALLOWED, printable_lines
@@ -73,7 +73,7 @@ REQUEST: Final = Record(
 
 @dataclass(frozen=True, slots=True)
 class Component:
-    """A component; ``fields`` maps names of fields to quantities as somebody wrote them."""
+    """A component; ``fields`` maps names of fields to quantities as written, bare numbers with the SI unit."""
 
     kind: str
     name: str
@@ -84,6 +84,11 @@ class Component:
 def kind_of(name: str) -> ComponentKind:
     """What a model says about a kind."""
     return _KINDS[name][1]
+
+
+def model_of_kind(name: str) -> str:
+    """The model whose machines have components of a kind."""
+    return _KINDS[name][0]
 
 
 @lru_cache(maxsize=8)
@@ -147,11 +152,27 @@ def _checked(node: Node, fields: Node) -> Component | None:
         given = {key: text.strip() for key, text in fields.value.items() if text.strip()}
     else:
         fields.refuse("wrong-type", "must be an object of texts", None, allowed="quantities with their units")
-    if not kind.sound:
+        return None
+    if kind.value not in KINDS:
         return None
     for fault in faults_of(str(kind.value), given):
         fields[fault.where or ""].refuse(fault.code, fault.message, fault.value, allowed=fault.allowed, unit=fault.unit)
-    return Component(str(kind.value), line.strip(), text or "", given) if name.sound else None
+    if not name.sound:
+        return None
+    return Component(str(kind.value), line.strip(), text or "", _with_units(str(kind.value), given))
+
+
+def _with_units(kind: str, fields: Mapping[str, str]) -> dict[str, str]:
+    """The fields, each bare number with its unit, so that nobody reads it in another one.
+
+    The items of a list have units of their own, which follow from their places.
+    """
+    known = fields_of(kind)
+    units = {name: one.unit for name, one in known.items() if one is not None and name != COEFFICIENTS}
+    return {
+        name: f"{text} {units[name]}" if units.get(name, "1") != "1" and not has_unit(text) else text
+        for name, text in fields.items()
+    }
 
 
 def faults_of(kind: str, fields: Mapping[str, str]) -> list[Fault]:

@@ -106,6 +106,8 @@ def not_csv(error: csv.Error) -> Sentence:
 
 def in_cell(line: int, message: str, column: str = "") -> Sentence:
     """A message about a line of a table, or about a cell of it."""
+    if not isinstance(message, Sentence):
+        message = Sentence(message)  # within another sentence it is translated too
     if not column:
         return Sentence("line {line}: {message}", line=str(line), message=message)
     return Sentence("line {line}, column {column}: {message}", line=str(line), column=column, message=message)

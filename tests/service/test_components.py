@@ -160,13 +160,50 @@ def test_the_page_keeps_shows_refuses_and_removes(service: Service) -> None:
     changed = service.http.get(f"/parts?edit={component}").text
     assert '<details class="columns" open><summary>Add or change a spring' in changed
     assert 'name="name" value="F-120"' in changed
-    assert 'name="fields/spring_rate" value="9 N/mm"' in changed
+    assert 'name="fields/spring_rate" value="9"' in changed
+    assert '<option value="N/mm" selected>' in changed
     assert service.http.get("/parts?edit=cm_none").status_code == 404
     # The button that removes is behind one that says so.
     removes = f'<summary>Remove</summary><ul><li><form method="post" action="/parts/{component}/delete">'
     assert removes in service.http.get("/parts").text
     service.http.post(f"/parts/{component}/delete")
     assert service.store.components.all("spring") == ()
+
+
+def test_a_bare_number_is_kept_with_the_unit_that_the_page_shows(service: Service) -> None:
+    sent = {"kind": "motor", "name": "M", "fields/characteristic": "kloss", "fields/breakdown_slip": "0.2"}
+    sent |= {"fields/synchronous_speed": "1500", "unit:fields/synchronous_speed": "rpm"}
+    sent |= {"fields/breakdown_torque": "70", "unit:fields/breakdown_torque": "N*m"}
+    beside = '<select name="unit:fields/synchronous_speed"'
+    page = service.http.get("/parts").text
+    assert '<option value="rpm" selected>' in page[page.index(beside) :].partition("</select>")[0]
+    assert service.http.post("/parts", data=sent, follow_redirects=False).status_code == 303
+    fields = service.store.components.all("motor")[0].component.fields
+    assert (fields["synchronous_speed"], fields["breakdown_torque"]) == ("1500 rpm", "70 N*m")
+    assert fields["breakdown_slip"] == "0.2"
+    # A program's bare number is in SI, and says so.
+    assert read_components({"csv": "kind,name,spring_rate\nspring,F,9\n"})[0].fields == {"spring_rate": "9 N/m"}
+
+
+def test_the_page_has_every_component_in_the_words_and_units_of_its_reader(service: Service) -> None:
+    stored(service, *ALL)
+    english = service.http.get("/parts").text
+    shown = ("9 N/mm", "0.3 deg", "1500 rpm", "70 N·m", "0 N·m; 210 N·m/rad; 0 N·m/rad²; 15 000 N·m/rad³")
+    for text in (*shown, "an induction motor (Kloss)"):
+        assert f"<td>{text}</td>" in english.replace("\N{NARROW NO-BREAK SPACE}", " ").replace("\xa0", " "), text
+    ukrainian = service.http.get("/parts?language=uk&units=si").text.replace("\N{NARROW NO-BREAK SPACE}", " ")
+    assert "<td>9000 Н/м</td>" in ukrainian
+    assert "<td>157,07963 рад/с</td>" in ukrainian
+    assert "<td>1500 об/хв</td>" in service.http.get("/parts?language=uk&units=typed").text
+
+
+def test_faults_of_the_page_name_fields_as_it_does(service: Service) -> None:
+    sent = {"kind": "motor", "name": "", "fields/characteristic": "linear", "fields/breakdown_slip": "0.2"}
+    page = service.http.post("/parts", data=sent).text
+    assert "allowed: Characteristic, No load speed, Stall torque, Inertia" in page
+    assert "got ;" not in page
+    page = service.http.post("/parts?language=uk", data={"do": "csv", "csv": "kind;name\nbelt;B\n"}).text
+    assert "рядок 2, стовпець kind: не є видом вузла" in page
 
 
 def test_the_client_and_the_interface(service: Service, portal: Any) -> None:

@@ -144,6 +144,7 @@ class ComponentKind:
     required : fields that every one must have
     ways : values of its choice, if it has one, and the fields that each needs and no other has
     choice : the field with that choice
+    titles : what the values of the choice are called
     twice, foreign, change, keep : what is said of one that is given twice, and of a field that it does not have; texts
         of its part of the page
     sets : further fields of the form that it fills in
@@ -159,6 +160,7 @@ class ComponentKind:
     keep: str
     choice: str = ""
     ways: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    titles: Mapping[str, str] = field(default_factory=dict)
     sets: Mapping[str, str] = field(default_factory=dict)
 
 

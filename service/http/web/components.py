@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Annotated
 
 from fastapi import Query
@@ -10,57 +11,106 @@ from starlette.responses import RedirectResponse, Response
 
 from sprag.service.faults import Fault, FaultError
 from sprag.service.http.context import Context, Ctx
+from sprag.service.http.current import current
 from sprag.service.http.problems import api_error
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.web.form.entries import Faults, Values
+from sprag.service.http.web.form.sent import settle
+from sprag.service.http.web.form.sheet import Quantity, preferred, quantity_of
 from sprag.service.http.web.form.values import Form
 from sprag.service.http.web.templates import page
 from sprag.service.http.work import Attended
 from sprag.service.jobs import checks
 from sprag.service.json_text import to_bytes
+from sprag.service.languages import gettext
 from sprag.service.reading.faults import message
-from sprag.service.reading.units import examples
-from sprag.service.reading.wording import words
+from sprag.service.reading.numbers import parse_number
+from sprag.service.reading.quantities import TYPED, Units, offered, read_units
+from sprag.service.reading.reader import Reading
+from sprag.service.reading.units import QuantityError, examples, parse_quantity, split_quantity
+from sprag.service.reading.wording import typed_text, words
 from sprag.service.spec.components import (
     COEFFICIENTS,
     KINDS,
     Component,
     fields_of,
     kind_of,
+    list_text,
+    model_of_kind,
     needed,
     require_component,
 )
 from sprag.service.storage.errors import ComponentNotFoundError
 from sprag.worker.limits import MAX_COMPONENTS
+from sprag.worker.models.parameters import placed
 
 router = page_router()
+
+#: Digits of a number that somebody typed.
+_DIGITS = 8
+#: Faults whose allowed values are names of fields or choices.
+_NAMING = ("unknown-field", "invalid-choice")
 
 
 @dataclass(frozen=True, slots=True)
 class _Column:
-    """A field of a kind on the page; ``unit`` is "" where it has none of its own."""
+    """A field of a kind on the page; ``choices`` are values and what they are called."""
 
     name: str
     label: str
-    unit: str
+    quantity: Quantity
     example: str
-    choices: tuple[str, ...] = ()
+    choices: Mapping[str, str] = field(default_factory=dict)
     required: bool = False
 
 
-def _columns(kind: str) -> list[_Column]:
-    found = []
+def _columns(kind: str, values: Values) -> list[_Column]:
+    """The fields of a kind; ``values`` are those of its form, whose numbers have a unit beside them."""
+    found, units = [], preferred(current().choice.units, model_of_kind(kind))
     for name, parameter in fields_of(kind).items():
-        must = name in needed(kind, {})
+        text, must = values.get(f"fields/{name}", ""), name in needed(kind, {})
         if parameter is None:
-            found.append(_Column(name, words(name), "", "", tuple(kind_of(kind).ways), must))
+            found.append(_Column(name, words(name), Quantity((text,)), "", kind_of(kind).titles, must))
         elif name == COEFFICIENTS:
-            found.append(_Column(name, words(name), "", "0; 200; 0; 20000", (), must))
+            each = "; ".join(placed(parameter, f"{COEFFICIENTS}.{index}").unit for index in range(2))
+            found.append(_Column(name, words(name), Quantity((text,), f"{each}; …"), "0; 200; 0; 20000", {}, must))
         else:
             shown = "" if parameter.unit == "1" else examples(parameter.unit)[0]
-            found.append(_Column(name, words(name), parameter.unit, shown, (), must))
+            found.append(_Column(name, words(name), quantity_of([text], parameter.unit, units), shown, {}, must))
     return found
+
+
+def _shown(component: Component) -> dict[str, str]:
+    """The fields of a component for the reader: quantities in units of the page, choices by what they are called."""
+    kind, shown = component.kind, dict[str, str]()
+    for name, text in component.fields.items():
+        parameter = fields_of(kind).get(name)
+        if parameter is None:
+            shown[name] = gettext(kind_of(kind).titles.get(text, text))
+        elif name == COEFFICIENTS:
+            each = enumerate(list_text(text))
+            shown[name] = "; ".join(
+                _printed(kind, item, placed(parameter, f"{COEFFICIENTS}.{index}").unit) for index, item in each
+            )
+        else:
+            shown[name] = _printed(kind, text, parameter.unit)
+    return shown
+
+
+def _printed(kind: str, text: str, si: str) -> str:
+    """A quantity in the unit of the page; "as typed" in the one that somebody wrote, if quantities are shown in it."""
+    choice, model, number = current().choice.units, model_of_kind(kind), parse_number(text)
+    try:
+        value = parse_quantity(text if number is None else number, si)
+        units = preferred(choice, model)
+        if read_units(choice)[0] == TYPED:
+            typed = f"1 {split_quantity(text)[1] or si}"
+            same = (unit for unit in offered(si) if parse_quantity(f"1 {unit}", si) == parse_quantity(typed, si))
+            units = {si: next(same, si)}
+        return Reading(model, Units(units)).quantity(value, si, _DIGITS)
+    except QuantityError:  # kept by an earlier release
+        return typed_text(text)
 
 
 @router.get("/parts")
@@ -89,6 +139,7 @@ def _values(context: Context, component_id: str) -> Values:
 async def put_component(context: Ctx, work: Attended, values: Form) -> Response:
     """Add or replace one component, or those of a CSV text; the page again, with what is wrong, where invalid."""
     csv = values.get("do") == "csv"
+    settle(values, with_ticks=False)
     try:
         if csv:
             given = await work.check(checks.components, to_bytes({"csv": values.get("csv", "")}), "json")
@@ -113,8 +164,16 @@ def _faults(error: FaultError, *, csv: bool) -> Faults:
     found: Faults = {}
     for fault in error.faults or (Fault("", "conflict", error.detail),):
         where = "csv" if csv else (fault.where or "").strip("/")
-        found.setdefault(where, []).append(message(fault))
+        names = (fault.allowed or "").split(", ") if not csv and fault.code in _NAMING else []
+        shown = replace(fault, allowed=", ".join(map(_called, names))) if names else fault
+        found.setdefault(where, []).append(message(shown))
     return found
+
+
+def _called(name: str) -> str:
+    """What a field or a choice is called on the page."""
+    titles = {choice: title for kind in KINDS for choice, title in kind_of(kind).titles.items()}
+    return gettext(titles.get(name, words(name)))
 
 
 @router.post("/parts/{component_id}/delete")
@@ -130,7 +189,11 @@ def _page(context: Context, values: Values, faults: Faults, status: int, read: i
         "parts.html",
         status=status,
         kinds=[
-            (kind_of(kind), _columns(kind), [record for record in records if record.component.kind == kind])
+            (
+                kind_of(kind),
+                _columns(kind, values if values.get("kind") == kind else {}),
+                [(record, _shown(record.component)) for record in records if record.component.kind == kind],
+            )
             for kind in KINDS
         ],
         values=values,

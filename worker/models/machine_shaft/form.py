@@ -177,6 +177,7 @@ FORM: Final = Form(
             twice="the motor is given twice", foreign="is not a field of this motor",
             change="Add or change a motor", keep="Keep the motor",
             choice="characteristic", ways=_COMPONENT_MOTORS,
+            titles={kind: MOTORS[kind][0] for kind in _COMPONENT_MOTORS},
         ),
     ),
     new={"/base/mechanism": "slider_crank", "/base/operation": "steps", "/refine/results": "irregularity"},
