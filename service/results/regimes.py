@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag.sentences import Amount
 from sprag.service.reading.reader import Phrase, joined, plural, term
 from sprag.worker.models import REGIME_SENTENCES
 
@@ -22,6 +23,10 @@ ORDER: Final = "regime.order"
 UNSETTLED: Final = "unsettled"
 #: Regimes that a line may join: a drive without a load coasts, as the limit of a vanishing load.
 _CONTINUOUS: Final = frozenset({"coasting", "periodic"})
+
+
+#: Relative difference of two speeds that a sentence does not tell apart.
+_SAME: Final = 5e-4
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +59,29 @@ def motion_sentence(regime: str, order: int | None) -> Phrase:
         "The motion repeats after {count} excitation period, and disturbances of it die away.",
         "The motion repeats after {count} excitation periods, and disturbances of it die away.",
         order,
+    )
+
+
+def coasting_sentence(results: Mapping[str, object]) -> Phrase | None:
+    """That the run of a case comes to another speed than the one that is its result; None where it does not.
+
+    Without a load every speed above the pendulums' is steady, so a motion over time depends on its start, and the
+    result is the limit of a vanishing load (docs/theory.md, "No load").
+
+    Parameters
+    ----------
+    results : mapping
+        Results of a case by name, SI.
+    """
+    limit, reached = results.get("shaft.speed.mean"), results.get("shaft.speed.from_rest")
+    if not (isinstance(limit, float) and isinstance(reached, float) and math.isfinite(reached)):
+        return None
+    if math.isclose(reached, limit, rel_tol=_SAME):
+        return None
+    return Phrase(
+        "A motion without a load depends on its start: the motion over time, from the case's own start, comes to "
+        "{reached} and keeps it.",
+        reached=Amount(reached, "rad/s", 3),
     )
 
 

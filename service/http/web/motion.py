@@ -35,7 +35,7 @@ from sprag.service.reading.reader import Phrase, joined, meanings
 from sprag.service.results.defaults import main_results
 from sprag.service.results.headlines.along import told
 from sprag.service.results.headlines.headline import MOST, NOTHING, KeyNumber, amount, digits
-from sprag.service.results.regimes import ORDER, motion_sentence
+from sprag.service.results.regimes import ORDER, coasting_sentence, motion_sentence
 from sprag.service.results.selection import axis_name, own_paths
 from sprag.service.results.start_states import check_start
 from sprag.service.results.sweeps import direction_texts
@@ -277,6 +277,7 @@ def _said(study: Study, row: CaseRow) -> list[str]:
     regime, order = row.results.get("regime"), row.results.get(ORDER)
     if isinstance(regime, str) and regime not in row.flags:
         said.append(motion_sentence(regime, order if isinstance(order, int) else None))
+        said += [text for text in [coasting_sentence(row.results)] if text is not None]
     return [joined("", [text]) for text in said]
 
 

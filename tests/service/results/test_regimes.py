@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from sprag.sentences import Amount
 from sprag.service.figures.curves import curves_figure, doubtful_marks
 from sprag.service.figures.pictures import draw_compare, draw_curves
 from sprag.service.figures.pictures import draw_map as paint_map
 from sprag.service.figures.svg import svg
+from sprag.service.http.web.motion import _said
 from sprag.service.reading.reader import Reading
 from sprag.service.results.curve_cases import draw, draw_map, select
 from sprag.service.results.curves import CurveQuery, Curves
-from sprag.service.results.regimes import MARKS, counted, regimes_of, stretches
+from sprag.service.results.regimes import MARKS, coasting_sentence, counted, regimes_of, stretches
 from sprag.service.spec.document import parse_spec
-from sprag.service.storage.studies.records import CaseColumns
+from sprag.service.storage.studies.records import CaseColumns, CaseRow
 from sprag.worker import models
 from sprag.worker.study import Study
+from tests.acceptance.processes import EXAMPLES
 from tests.service.figures.seen import seen
 from tests.service.spec_sample import changed
 
@@ -120,3 +124,24 @@ def test_a_map_marks_what_is_not_periodic(name: str) -> None:
     assert found.to_json()["regime"][1] == REGIMES
     assert found.to_json()["order"][1] == [None if np.isnan(order) else int(order) for order in ORDERS]
     assert MARKS[name].colour.encode() in paint_map(found, "", "svg")
+
+
+def test_a_case_without_a_load_says_to_which_speed_its_motion_over_time_comes() -> None:
+    spec = json.loads((EXAMPLES / "one_pendulum.json").read_text(encoding="utf-8"))
+    spec["axes"] = [{"path": "shaft.load", "values": [0, "0.1 N*m"]}]
+    study = parse_spec(spec).study
+    done, infos = models.run_chunk(study, 0, 2), models.study_results(study)
+    coasting, loaded = (
+        {info.name: value for info, value in zip(infos, row, strict=True)} for row in done.values.tolist()
+    )
+    said = coasting_sentence(coasting)
+    assert said is not None
+    motion = models.run_trajectory(study, 0, 3.9, 4.0, 50)
+    speeds = motion.values[:, list(motion.names).index("shaft.speed")]
+    reached = said.parts["reached"]
+    assert isinstance(reached, Amount)
+    assert speeds == pytest.approx(reached.value, rel=1e-9)
+    assert coasting["shaft.speed.mean"] < 0.95 * reached.value
+    assert coasting_sentence(loaded) is None
+    row = CaseRow(0, models.OK, (), {**coasting, "regime": "coasting", "regime.order": 1})
+    assert "own start, comes to 40.9 rad/s and keeps it." in " ".join(_said(study, row))
