@@ -214,6 +214,15 @@ def typed_units(study: Study, spec: Mapping[str, Any]) -> dict[str, str]:
     return {si: counter.most_common(1)[0][0] for si, counter in votes.items()}
 
 
+def typed_unit(base: object, path: str) -> str:
+    """The unit in which ``base`` has the quantity at a path; "" where it has none there."""
+    text = next((text for known, text in _texts(base, "") if known == path), "")
+    try:
+        return split_quantity(text)[1] if text else ""
+    except QuantityError:
+        return ""
+
+
 def _quantities(study: Study, spec: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """Every text of a spec that may be a quantity, with the SI unit of its parameter or result."""
     for path, text in _texts(spec.get("base"), ""):

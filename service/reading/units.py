@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
+from decimal import Decimal, localcontext
 from fractions import Fraction
 from functools import lru_cache
 from typing import TYPE_CHECKING, Final
@@ -75,6 +76,9 @@ _POUNDS: Final = re.compile(r"(?<![A-Za-z])(lb|oz)-(in|ft)(?=\^?2(?![0-9.]))")
 #: Moments of inertia without the multiplication sign, as in "kgm2".
 _INERTIA: Final = re.compile(r"(?<![A-Za-z])(k?g)(m|cm|mm)\^?2(?![0-9.])")
 _LONGEST_UNIT: Final = 40
+#: Digits that tell every double from its neighbours in another unit too, and zeros before a number with a power of ten.
+_MOST_DIGITS: Final = 19
+_PLAIN: Final = 4
 _SUPERSCRIPTS: Final = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 _SIGNS: Final = str.maketrans("\u2212\u2013·⋅×\u2219μ\u00a0\u202f\u2009", "--****µ   ")
 
@@ -191,6 +195,36 @@ def typed_value(text: str, unit: str) -> float:
     """The value (SI) of a text that is in ``unit`` where it has no unit of its own; QuantityError."""
     number, own = split_quantity(text)
     return parse_quantity(text, unit) if own else to_float(number)
+
+
+def exact_quantity(value: float, si: str, unit: str) -> str:
+    """The shortest text in ``unit`` that is read as the same number: ``19.483405177994265 N/mm``.
+
+    Parameters
+    ----------
+    value : number in SI
+    si, unit : units of it in SI and in the text; where no text in the latter gives the number, it is in SI
+
+    Raises
+    ------
+    QuantityError
+        If ``unit`` is not one of the quantity.
+    """
+    near = Fraction(value) / parse_exact(f"1 {unit}", si)
+    for digits in range(1, _MOST_DIGITS + 1):
+        text = f"{_rounded(near, digits)} {unit}"
+        if parse_quantity(text, si) == value:
+            return text
+    return f"{value!r} {si}"
+
+
+def _rounded(number: Fraction, digits: int) -> str:
+    """A number rounded to so many significant digits, without zeros behind them."""
+    with localcontext() as context:
+        context.prec = digits
+        decimal = Decimal(number.numerator) / Decimal(number.denominator)
+    exponent = decimal.adjusted()
+    return format(decimal, "f" if -_PLAIN < exponent < _MOST_DIGITS else "e").replace("e+", "e") if decimal else "0"
 
 
 def has_unit(text: str) -> bool:

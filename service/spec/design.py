@@ -7,6 +7,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.quantities import typed_unit, typed_units
+from sprag.service.reading.units import QuantityError, exact_quantity
 from sprag.service.spec.derive import with_values
 from sprag.service.spec.fields import renamed
 from sprag.service.spec.kinds.registry import without_cases
@@ -38,18 +40,23 @@ def design_spec(spec: Mapping[str, Any], study: Study, case: int, along: str | N
     """
     apart = {*study.derive, *NO_PARAMETERS}
     values = {path: value for path, value in study.case_parameters(case).items() if path not in apart}
+    typed = typed_units(study, spec)
+
+    def text(path: str, value: float) -> float | str:
+        return _text(study, path, value, typed_unit(spec["base"], path), typed)
+
     # The nominal drive of a design keeps its tolerances; a drawn drive has its own values in the base.
     nominal = not study.case_parameters(case).get(DRIVE)
     made = {
         **without_cases(spec, SPREAD if nominal else ()),
         "name": renamed(spec.get("name", ""), f", design of case {case}"),
-        "base": with_values(spec["base"], {path: _text(study, path, value) for path, value in values.items()}),
+        "base": with_values(spec["base"], {path: text(path, value) for path, value in values.items()}),
     }
     if along is not None:
         most = _BEYOND * values.get(along, study.base[along])
         entry = parameter_of(study, along)
         least = 0.0 if entry is None or entry.accepts(0.0) else most / _VALUES
-        made["axes"] = [{"path": along, "linspace": [_text(study, along, least), _text(study, along, most), _VALUES]}]
+        made["axes"] = [{"path": along, "linspace": [text(along, least), text(along, most), _VALUES]}]
     return made
 
 
@@ -70,6 +77,12 @@ def points_spec(spec: Mapping[str, Any], study: Study, cases: Sequence[int]) -> 
     return {**without_cases(spec), "name": name, "axes": [{"points": "\n".join([",".join(heads), *lines])}]}
 
 
-def _text(study: Study, path: str, value: float) -> float | str:
+def _text(study: Study, path: str, value: float, own: str, typed: Mapping[str, str]) -> float | str:
+    """The same number in the unit in which the study has this parameter, otherwise others of its kind."""
     unit = unit_of(study, path)
-    return value if unit == "1" else f"{value!r} {unit}"
+    if unit == "1":
+        return value
+    try:
+        return exact_quantity(value, unit, own or typed.get(unit, unit))
+    except QuantityError:
+        return f"{value!r} {unit}"

@@ -96,11 +96,11 @@ def parse_measured(text: str, convert: Callable[[str, str], float]) -> MeasuredD
     rows = [CsvRow(row.line, [_unquoted(cell) for cell in row.cells]) for row in table.rows]
     if not rows:
         raise MeasuredDataError([Fault("line 1", "empty", "there are no data", allowed="rows of angle and torque")])
-    factors: tuple[float | None, float | None] = (None, None)
+    units: tuple[str | None, str | None] = (None, None)
     if _is_header(rows[0].cells):
         rows = with_units(rows)
-        factors = _factors(rows.pop(0), convert)
-    return _numbers(table._replace(rows=rows), factors)
+        units = _units(rows.pop(0), convert)
+    return _numbers(table._replace(rows=rows), units, convert)
 
 
 def _split(text: str) -> Split:
@@ -126,8 +126,8 @@ def _is_header(cells: list[str]) -> bool:
     return all(parse_number(cell) is None and not is_ambiguous(cell) for cell in cells)
 
 
-def _factors(row: CsvRow, convert: Callable[[str, str], float]) -> tuple[float | None, float | None]:
-    """Factors of the two columns to SI from the units in the header; None for a column without a unit."""
+def _units(row: CsvRow, convert: Callable[[str, str], float]) -> tuple[str | None, str | None]:
+    """Units of the two columns in the header; None for a column without a unit."""
     if len(row.cells) != len(_QUANTITIES):
         given = ", ".join(row.cells)[:80]
         raise MeasuredDataError([
@@ -136,11 +136,11 @@ def _factors(row: CsvRow, convert: Callable[[str, str], float]) -> tuple[float |
                 allowed="angle, torque",
             )
         ])  # fmt: skip
-    factors: list[float | None] = []
+    units: list[str | None] = []
     problems = []
     for cell, (name, unit), words in zip(row.cells, _QUANTITIES, _WORDS, strict=True):
         try:
-            factors.append(_factor(cell, unit, words, convert))
+            units.append(_unit(cell, unit, words, convert))
         except ValueError as error:
             where = f"line {row.line}"
             what = getattr(error, "message", str(error))
@@ -148,10 +148,10 @@ def _factors(row: CsvRow, convert: Callable[[str, str], float]) -> tuple[float |
             problems.append(Fault(where, "wrong-unit", message, cell, allowed=_UNITS[unit]))
     if problems:
         raise MeasuredDataError(problems)
-    return factors[0], factors[1]
+    return units[0], units[1]
 
 
-def _factor(heading: str, unit: str, words: frozenset[str], convert: Callable[[str, str], float]) -> float | None:
+def _unit(heading: str, unit: str, words: frozenset[str], convert: Callable[[str, str], float]) -> str | None:
     found = _UNIT_IN_HEADER.search(heading)
     text = ((found[1] or found[2]) if found else heading.rpartition(" ")[2]).strip()
     if text.lower() in words:
@@ -159,12 +159,13 @@ def _factor(heading: str, unit: str, words: frozenset[str], convert: Callable[[s
     if found is None and len(text) < 2:
         message = Sentence("'{heading}' names neither the quantity nor its unit", heading=heading)
         raise QuantityError("wrong-unit", message)
-    return convert(f"1 {text}", unit)
+    convert(f"1 {text}", unit)  # refuses units of other quantities
+    return text
 
 
-def _assumed(factors: tuple[float | None, float | None], rows: NDArray[np.float64]) -> Iterator[WarningText]:
+def _assumed(units: tuple[str | None, str | None], rows: NDArray[np.float64]) -> Iterator[WarningText]:
     """Warnings about assumptions where the file names no units."""
-    angle, torque = (factor is None for factor in factors)
+    angle, torque = (unit is None for unit in units)
     if angle or torque:
         taken = (
             Sentence("angles are taken in rad and torques are taken in N*m")
@@ -178,7 +179,7 @@ def _assumed(factors: tuple[float | None, float | None], rows: NDArray[np.float6
         )
         yield WarningText(text, "assumed-units")
     largest = float(np.abs(rows[:, 0]).max())
-    if factors[0] is None and largest > _LARGEST_PLAUSIBLE:
+    if units[0] is None and largest > _LARGEST_PLAUSIBLE:
         text = Sentence(
             "the largest angle would be {angle} rad, {degrees} degrees; was it in degrees?",
             angle=Amount(largest, digits=6),
@@ -187,7 +188,7 @@ def _assumed(factors: tuple[float | None, float | None], rows: NDArray[np.float6
         yield WarningText(text, "implausible-value")
 
 
-def _numbers(table: Split, factors: tuple[float | None, float | None]) -> MeasuredData:
+def _numbers(table: Split, units: tuple[str | None, str | None], convert: Callable[[str, str], float]) -> MeasuredData:
     rows, doubt = settled_table(table)
     problems = list(itertools.islice(_wrong_rows(table, rows), _MAX_PROBLEMS))
     if doubt is not None and not doubt.likely:
@@ -203,12 +204,24 @@ def _numbers(table: Split, factors: tuple[float | None, float | None]) -> Measur
         allowed = Sentence("1 .. {high} rows", high=str(MAX_CLUTCH_ROWS))
         raise MeasuredDataError([Fault("data", "empty" if not rows else "too-many", message, len(rows), allowed)])
     numbers = np.array([[parse_number(cell) for cell in row.cells] for row in rows], dtype=np.float64)
-    scaled = numbers * np.array([1.0 if factor is None else factor for factor in factors])
-    warnings = list(_assumed(factors, numbers))
+    columns = zip(numbers.T.tolist(), units, _QUANTITIES, strict=True)
+    scaled = np.array([
+        column if unit is None else [_converted(value, unit, si, convert) for value in column]
+        for column, unit, (_, si) in columns
+    ]).T  # fmt: skip
+    warnings = list(_assumed(units, numbers))
     if doubt is not None:
         text = of_line(doubt.line, assumption(doubt.text))
         warnings.append(WarningText(text, "ambiguous-point"))
     return MeasuredData(scaled, tuple(row.line for row in rows), tuple(warnings))
+
+
+def _converted(value: float, unit: str, si: str, convert: Callable[[str, str], float]) -> float:
+    """A number of a column in SI, rounded once as one that is typed with its unit; at the ends of the doubles twice."""
+    try:
+        return convert(f"{value!r} {unit}", si)
+    except ValueError:
+        return value * convert(f"1 {unit}", si)
 
 
 def _wrong_rows(written: Split, rows: Sequence[CsvRow]) -> Iterator[Fault]:

@@ -19,6 +19,7 @@ from sprag.service.http.web.form.entries import (
 from sprag.service.http.web.form.machine import BASE, Entry, entries, form_of, rows_of
 from sprag.service.languages import N_, _, gettext
 from sprag.service.reading.faults import allowed_text, fault_text
+from sprag.service.reading.numbers import parse_number
 from sprag.service.reading.part_names import lower_first
 from sprag.service.reading.printed import could_be_several
 from sprag.service.reading.together import with_last_unit
@@ -244,8 +245,7 @@ def _text(entry: Entry, base: Mapping[str, Any]) -> str | None:
         case "list":
             return "; ".join(map(text_of, value))
         case "measured":
-            rows = "\n".join(f"{_si(angle, 'rad')!r}\t{_si(torque, 'N*m')!r}" for angle, torque in value)
-            return f"angle_rad\ttorque_Nm\n{rows}"
+            return _measured_text(value)
         case "constants":
             return "\n".join(f"{name} = {text_of(item)}" for name, item in value.items())
         case "steps":
@@ -253,6 +253,27 @@ def _text(entry: Entry, base: Mapping[str, Any]) -> str | None:
     if isinstance(value, Mapping | list):
         raise ValueError("the form has no fields for all of this machine")
     return text_of(value)
+
+
+def _measured_text(rows: Sequence[Sequence[Any]]) -> str:
+    """Measured rows as a table: each column as it was typed where all of it has one unit, otherwise in SI."""
+    angles, torques = (
+        _column(list(column), name, si)
+        for column, name, si in zip(zip(*rows, strict=True), ("angle", "torque"), ("rad", "N*m"), strict=True)
+    )
+    return "\n".join("\t".join(cells) for cells in zip(angles, torques, strict=True))
+
+
+def _column(cells: Sequence[Any], name: str, si: str) -> list[str]:
+    """Heading and numbers of a column of quantities."""
+    numbers = [_si(cell, si) for cell in cells]
+    parts = [cell.strip().partition(" ") for cell in cells if isinstance(cell, str)]
+    units = {unit.strip() for _number, _blank, unit in parts}
+    if len(parts) == len(cells) and len(units) == 1 and (unit := units.pop()):
+        typed = [number for number, _blank, _unit in parts]
+        if all(parse_number(text) is not None for text in typed):
+            return [f"{name} [{unit}]", *typed]
+    return [f"{name}_{si.replace('*', '')}", *map(repr, numbers)]
 
 
 def _csv(entry: Entry, base: Mapping[str, Any], rows: Sequence[Sequence[Any]]) -> str:

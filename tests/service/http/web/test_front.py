@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
+from sprag.service.http.web.form.sent import settle
 from sprag.service.http.web.form.spec import spec_of
 from sprag.service.spec.design import design_spec
 from sprag.service.spec.document import parse_spec
@@ -52,3 +55,16 @@ def test_a_design_becomes_a_study_of_its_own(service: Service) -> None:
     assert begun.base["shaft.inertia"] == pytest.approx(inertia, rel=1e-12)
     assert 'value="search, design of case 5"' in form
     assert service.http.get(f"/new?clone={study_id}&case=99").status_code == 404
+
+
+def test_a_design_is_taken_over_in_the_units_of_its_study_with_every_digit(service: Service) -> None:
+    study_id = search(service, rounds=1)
+    study, spec = service.store.studies.study(study_id), service.store.studies.spec(study_id)
+    base = design_spec(spec, study, 5)["base"]
+    assert re.fullmatch(r"[0-9.]+ mm", base["excitation"]["amplitude_x"])
+    form = Controls(service.http.get(f"/new?clone={study_id}&case=5").text).values
+    settle(form)
+    begun, case = parse_spec(spec_of(form)[0]).study, study.case_parameters(5)
+    assert {path: begun.base[path] for path in case if path in begun.base} == {
+        path: value for path, value in case.items() if path in begun.base
+    }

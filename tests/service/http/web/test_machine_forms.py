@@ -20,6 +20,7 @@ from sprag.service.presets import preset_names
 from sprag.service.spec.document import parse_spec
 from sprag.worker import models
 from sprag.worker.chunking import Chunking
+from tests.acceptance.processes import EXAMPLES
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service
@@ -102,3 +103,14 @@ def test_fields_of_older_drafts_are_read(service: Service) -> None:
     assert history_of({"history": '[{"drive_is": "found", "clutches": null}]'}) == [
         {"/base/drive": "found", "/base/clutches": None}
     ]
+
+
+def test_measured_rows_are_taken_over_as_they_were_typed() -> None:
+    spec = json.loads((EXAMPLES / "measured_clutch.json").read_text(encoding="utf-8"))
+    values = values_of(spec)
+    text = values["/base/pendulums/0/clutch/data"]
+    assert text.splitlines()[:2] == ["angle [deg]\ttorque [N*mm]", "0.25\t878"]
+    assert parse_spec(spec_of(values)[0]).study == parse_spec(spec).study
+    spec["base"]["pendulums"][0]["clutch"]["data"][0][0] = 0.004
+    text = values_of(spec)["/base/pendulums/0/clutch/data"]
+    assert text.splitlines()[:2] == ["angle_rad\ttorque [N*mm]", "0.004\t878"]
