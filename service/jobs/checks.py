@@ -25,7 +25,7 @@ from sprag.service.spec.components import Component, read_components
 from sprag.service.spec.document import load_spec, parse_spec
 from sprag.service.spec.extend import parse_extended
 from sprag.service.spec.labels import StudyChange, read_change
-from sprag.service.spec.longer import longer_spec
+from sprag.service.spec.longer import longer_spec, runs_over_time
 from sprag.service.spec.machine.shaft_check import compile_elsewhere
 from sprag.service.spec.narrow import narrowed_spec, swept_axis
 from sprag.service.spec.report import SpecError
@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from sprag.service.results.explore import ExploreQuery
     from sprag.service.spec.text import Format
     from sprag.service.storage.store import Store
+    from sprag.worker.study import Study
 
 #: Fields of a schedule by which it is paused and resumed, and the most bytes of a body with them.
 _PAUSING: Final = frozenset({"enabled", "paused_until"})
@@ -114,9 +115,15 @@ def extended_study(
     return submission(parsed, store, now, finish_by=finish, given=given)
 
 
+def _refuse_without_time(study: Study) -> None:
+    if not runs_over_time(study):
+        raise FaultError("wrong-state", "The cases of this study are computed over one cycle: none runs longer.")
+
+
 def kind_to_run_longer(store: Store, study_id: str, regime: str | None) -> str:
-    """The regime or flag of the cases to run longer; FaultError where no case has it."""
+    """The regime or flag of the cases to run longer; FaultError where no case has it, or none can."""
     study, kinds = store.studies.study(study_id), store.rows.kinds(study_id)
+    _refuse_without_time(study)
     if models.is_settled(study.run):
         if (wanted := regime or UNSETTLED) in kinds.regimes:
             return wanted
@@ -140,11 +147,12 @@ def longer_study(
 ) -> Submission:
     """The cases of a study with that regime, or with that flag where there are no regimes, with more time to settle.
 
-    Or the cases of those numbers. There must be at least one. Raises SpecError, StudyNotFoundError, and IndexError for
-    numbers of cases that there are not.
+    Or the cases of those numbers. There must be at least one. Raises SpecError, StudyNotFoundError, FaultError where
+    cases do not run over time, and IndexError for numbers of cases that there are not.
     """
     store = library.store
     study = store.studies.study(study_id)
+    _refuse_without_time(study)
     if isinstance(kind, str):
         named = {"regime" if models.is_settled(study.run) else "flag": kind}
         cases = store.rows.cases_of_kind(study_id, **named)

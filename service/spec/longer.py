@@ -26,6 +26,11 @@ TIMES: Final = 4
 _SUFFIX: Final = ", longer"
 
 
+def runs_over_time(study: Study) -> bool:
+    """Whether cases run for a time, which can be longer; a machine shaft, for instance, is computed over its cycle."""
+    return is_settled(study.run) or "duration" in study.run
+
+
 def longer_spec(
     spec: Mapping[str, Any], study: Study, cases: NDArray[np.int64], at_most: int | None = None
 ) -> dict[str, Any]:
@@ -35,7 +40,7 @@ def longer_spec(
     Parameters
     ----------
     spec : the study's own spec
-    study : the same in SI numbers
+    study : the same in SI numbers; one whose cases run over time (`runs_over_time`)
     cases : numbers of cases, at least one
     at_most : by default `TIMES` times as many as the study allows
     """

@@ -42,7 +42,7 @@ def further_infos(study: Study) -> tuple[ResultInfo, ...]:
 def goal_order(study: Study) -> str:
     """What the rows of a study are sorted by first: the goal of a search, the main result of any other study.
 
-    Of drives with tolerances the weakest come first.
+    The best come first, of drives with tolerances the weakest.
     """
     if is_search(study):
         plan = goal_of(study)
@@ -53,7 +53,8 @@ def goal_order(study: Study) -> str:
     name = judged_by(study, drawn_results(study, infos))
     if (info := result_of(infos, name)) is None or info.kind == "category":
         return "case"
-    return name if study.spread is not None else f"-{name}"
+    rising = models.presentation_of(study).is_best_small(name) is (study.spread is None)
+    return name if rising else f"-{name}"
 
 
 def first_rows(study: Study) -> ExploreQuery:

@@ -118,6 +118,7 @@ class Presentation:
     main : the main results of a machine; ``heading`` is their common title
     below : results of the chart below that of the first result of ``clauses``, in order of preference
     answers : what a page says first; where there are none, the largest and smallest values of the drawn results
+    wanted : parameter with the wanted value of a result, by the name of the result
     clauses : what is said of a case in a sentence
     shares : results that are a share of something, with N and K for indices: people may read them in per cent
     workshop : units in which a workshop reads its quantities; SI where it has none
@@ -147,6 +148,7 @@ class Presentation:
     heading: str = "Main results"
     below: tuple[str, ...] = ()
     answers: tuple[Answer, ...] = ()
+    wanted: Mapping[str, str] = field(default_factory=dict)
     clauses: Clauses = field(default_factory=Clauses)
     shares: tuple[str, ...] = ()
     workshop: tuple[str, ...] = ("deg", "rpm", "mm", "bar", "N/mm", "%")
@@ -168,6 +170,10 @@ class Presentation:
     form: Form = field(default_factory=Form)
     laboratory: Laboratory = field(default_factory=Laboratory)
     theory: Mapping[str, str] = field(default_factory=dict)
+
+    def is_best_small(self, result: str) -> bool:
+        """Whether a result is the better the smaller it is, such as an irregularity."""
+        return any(one.result == result and one.kind == "smallest" for one in self.answers)
 
     def explained(self, path: str) -> str:
         """Page of docs/ and heading that explain a parameter or another entry of the base; "" where none does."""

@@ -83,6 +83,15 @@ def judged_by(study: Study, known: Sequence[str] | Mapping[str, object]) -> str:
     return next((name for name in wanted if name in known), next(iter(known)))
 
 
+def wanted_of(study: Study, name: str, parameters: Mapping[str, float] | None = None) -> float | None:
+    """The value (SI) of a result that is wanted, of a case with such ``parameters``; None where there is not one."""
+    path = models.presentation_of(study).wanted.get(name)
+    if path is None or (parameters is None and path in study.column_paths):
+        return None
+    value = (parameters or {}).get(path, study.base.get(path))
+    return float(value) if value is not None and np.isfinite(value) else None
+
+
 def told(
     study: Study, infos: Mapping[str, ResultInfo], values: Mapping[str, float], widths: Mapping[str, float]
 ) -> Phrase:

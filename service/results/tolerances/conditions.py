@@ -44,8 +44,7 @@ Kind = Literal["at_least", "at_most", "is"]
 
 def first_condition(study: Study, result: str) -> str:
     """The condition on a result with which a page begins: a tenth worse than the nominal drive at most."""
-    answers = models.presentation_of(study).answers
-    small = any(answer.result == result and answer.kind == "smallest" for answer in answers)
+    small = models.presentation_of(study).is_best_small(result)
     return f"{result} <= 110 % of nominal" if small else f"{result} >= 90 % of nominal"
 
 

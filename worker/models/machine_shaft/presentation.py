@@ -94,6 +94,7 @@ PRESENTATION: Final = Presentation(
         Answer("mean_energy", "Mean kinetic energy", "energy.mean", "here"),
         Answer("least_irregularity", "Least irregularity", "irregularity", "smallest"),
     ),
+    wanted={"irregularity": "wanted_irregularity"},
     clauses=Clauses(
         results={"irregularity": "irregularity", "inertia": "required_inertia"},
         here=(

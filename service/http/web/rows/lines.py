@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -10,6 +11,7 @@ import numpy as np
 from sprag.service.figures.painter.elements import SMALL, text_width
 from sprag.service.figures.painter.elements import lines_of as lines_of_text
 from sprag.service.results.explore import histogram
+from sprag.service.results.headlines.along import wanted_of
 from sprag.worker.directions import DIRECTIONS, SWEEP
 
 if TYPE_CHECKING:
@@ -50,6 +52,7 @@ class Axis:
     range : bottom and top (px) of the chosen range; None where there is none
     log : whether it is logarithmic
     words : names of a direction with their places (px), in the place of numbers
+    wanted : place (px) of the value that is wanted; None where there is none on the axis
     """
 
     name: str
@@ -60,6 +63,14 @@ class Axis:
     range: tuple[float, float] | None
     log: bool
     words: tuple[tuple[str, float], ...] = ()
+    wanted: float | None = None
+
+    @property
+    def digits(self) -> int:
+        """Digits with which its numbers differ, at least three."""
+        low, middle, high = self.ends
+        share = min(abs(middle - low), abs(high - middle)) / max(abs(low), abs(high))
+        return min(max(math.ceil(1.0 - math.log10(share)), 3), 9)
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,7 +187,11 @@ class _Scale:
             (name, TOP + HEIGHT * (1.0 - float(self.share(float(place))))) for place, name in enumerate(DIRECTIONS)
         )
         ends_ = (high, middle, low) if self.flip else (low, middle, high)
-        return Axis(self.name, self.unit, ends_, x, bars, chosen, self.log, words if self.name == SWEEP else ())
+        wanted = wanted_of(found.study, self.name)
+        mark = None
+        if wanted is not None and low <= wanted <= high:
+            mark = TOP + HEIGHT * (1.0 - float(self.share(wanted)))
+        return Axis(self.name, self.unit, ends_, x, bars, chosen, self.log, words if self.name == SWEEP else (), mark)
 
 
 def _bars(counts: Sequence[int], x: int) -> str:

@@ -38,6 +38,7 @@ from sprag.service.reading.numbers import whole_number
 from sprag.service.reading.reader import meanings
 from sprag.service.results.explore import ExploreQuery, explored_csv, explored_json
 from sprag.service.results.selection import own_paths
+from sprag.service.spec.longer import runs_over_time
 from sprag.service.views.explore import selection_spec
 from sprag.service.views.library import reading_of
 from sprag.service.views.rows import is_search, rows_of
@@ -109,6 +110,7 @@ def _page(context: Context, study_id: str, view: RowsPage) -> Response:
         wrong={fault.where: message(fault) for fault in asked.faults},
         field_names={"least": _("at least"), "most": _("at most")},
         search=is_search(study),
+        can_run_longer=runs_over_time(study),
         chips=chips_of(view, reading),
         pane=view.chosen,
         was=lambda path, value: _was(study, path, value),

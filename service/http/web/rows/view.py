@@ -11,6 +11,7 @@ from sprag.service.http.web.rows.asked import Asked, read_asked
 from sprag.service.http.web.rows.lines import Lines, lines_of, shades_of
 from sprag.service.http.web.rows.points import points_of
 from sprag.service.results.explore import explored_rows
+from sprag.service.results.headlines.along import wanted_of
 from sprag.service.views.library import reading_of
 from sprag.service.views.rows import PLACES, rows_of
 
@@ -29,13 +30,21 @@ _NO_NUMBERS: Final = frozenset({"case", "ending", "flags", "regime"})
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """The row in the pane: its main quantity, "" for none, its place on the page, from 1, and its neighbours there."""
+    """The row in the pane.
+
+    Attributes
+    ----------
+    main : its main quantity, "" for none; ``wanted`` is the wanted value of it (SI)
+    place : from 1 within the conditions; None where it is on no page that was read
+    before, after : its neighbours: numbers, and before which row their pages begin
+    """
 
     row: ExploredCase
     main: str
+    wanted: float | None
     place: int | None
-    before: int | None
-    after: int | None
+    before: tuple[int, int] | None
+    after: tuple[int, int] | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +57,7 @@ class RowsPage:
     conditions, ranges : what conditions do, and the checked ranges
     shown, units : names of the shown quantities, and units of all by name
     rows : those of the page, with the shade of each
+    before : number of the last row of the page before; None on the first one
     lines, points : the plot, one of both; points are their two quantities and their picture
     colour : what shades stand for: name and ends (SI), the palest first; None where it has no numbers
     """
@@ -64,6 +74,7 @@ class RowsPage:
     lines: Lines | None
     points: tuple[tuple[str, str], str] | None
     chosen: Chosen | None
+    before: int | None
 
 
 def rows_view(library: Library, study_id: str, pairs: Sequence[tuple[str, str]], choice: Choice) -> RowsPage:
@@ -75,11 +86,13 @@ def rows_view(library: Library, study_id: str, pairs: Sequence[tuple[str, str]],
     colour = asked.colour or query.sort.removeprefix("-")
     colour = "" if colour in _NO_NUMBERS else colour
     also = tuple(filter(None, (colour, *((asked.x, asked.y) if asked.plot == "points" else ()))))
-    found = rows_of(library, study_id, replace(query, limit=asked.skip + query.limit, also=also))
-    found = replace(found, order=found.order[asked.skip :])
+    found = rows_of(library, study_id, replace(query, limit=asked.skip + query.limit + 1, also=also))
+    chosen = _chosen(found, asked)
+    before = int(found.rows.cases[found.order[asked.skip - 1]]) if 0 < asked.skip <= found.order.size else None
+    found = replace(found, order=found.order[asked.skip : asked.skip + query.limit])
     shades, ends = _shades(found, colour, asked)
     rows = tuple(zip(explored_rows(study, found), shades[found.order].tolist(), strict=True))
-    chosen, lines, points = _chosen(found, asked), None, None
+    lines, points = None, None
     if asked.plot == "lines":
         lines = lines_of(found, asked.log, asked.flip, shades, outside=asked.outside)
     elif found.known:
@@ -97,6 +110,7 @@ def rows_view(library: Library, study_id: str, pairs: Sequence[tuple[str, str]],
         lines,
         points,
         chosen,
+        before,
     )
 
 
@@ -113,20 +127,28 @@ def _shades(found: Explored, colour: str, asked: Asked) -> tuple[np.ndarray, tup
 
 
 def _chosen(found: Explored, asked: Asked) -> Chosen | None:
-    """The chosen row, or the first one."""
-    order = found.order
+    """The chosen row, or the first one of the page; ``found`` has the rows up to the one behind the page."""
+    order, study = found.order[asked.skip :], found.study
     if asked.row is not None:
         place = int(np.searchsorted(found.rows.cases, asked.row))
         if place < found.known and found.rows.cases[place] == asked.row:
             order = np.array([place])
     if not order.size:
         return None
-    row = next(explored_rows(found.study, replace(found, order=order[:1])))
+    row = next(explored_rows(study, replace(found, order=order[:1])))
     names = [name for name in row["results"] if name not in PLACES]
     main = found.plan.sort if found.plan.sort in names else next(iter(names), "")
+    wanted = wanted_of(study, main, row["parameters"])
     at = np.flatnonzero(found.order == order[0])
     if not at.size:
-        return Chosen(row, main, None, None, None)
-    cases, own = found.rows.cases[found.order].tolist(), int(at[0])
-    after = cases[own + 1] if own + 1 < len(cases) else None
-    return Chosen(row, main, asked.skip + own + 1, cases[own - 1] if own else None, after)
+        return Chosen(row, main, wanted, None, None, None)
+    own = int(at[0])
+
+    def neighbour(place: int) -> tuple[int, int] | None:
+        if not 0 <= place < found.order.size:
+            return None
+        page = asked.query.limit * (place // asked.query.limit)
+        on_page = asked.skip <= place < asked.skip + asked.query.limit
+        return int(found.rows.cases[found.order[place]]), asked.skip if on_page else page
+
+    return Chosen(row, main, wanted, own + 1, neighbour(own - 1), neighbour(own + 1))

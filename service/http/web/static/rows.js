@@ -72,12 +72,22 @@
     address.searchParams.set("row", number);
     show(address.href, { only: "#pane" });
   };
+  // Beyond the ends of the page: its neighbour, with the nearest row.
+  const turn = (key) => {
+    const link = document.querySelector(`#rows .tools a[rel="${{ ArrowDown: "next", ArrowUp: "prev" }[key]}"]`);
+    if (!link) return false;
+    const address = new URL(link.href);
+    if (link.dataset.row) address.searchParams.set("row", link.dataset.row);
+    show(address.href, { push: true });
+    return true;
+  };
   document.addEventListener("keydown", (event) => {
     const { key, target } = event, row = target.closest?.("#rows tbody tr[data-case]");
     const on = row ?? (target === document.body ? document.querySelector("#rows tbody tr.on") : null);
     if (!on || event.ctrlKey || event.metaKey || event.altKey || event.shiftKey) return;
     const next = key === "ArrowDown" ? on.nextElementSibling : key === "ArrowUp" ? on.previousElementSibling : null;
     if (next?.dataset.case) choose(next);
+    else if (key.startsWith("Arrow")) { if (!turn(key)) return; }
     else if (key !== "Enter" || !target.matches("a, body") || !on.matches(".on")) return;
     else location.assign(`${location.pathname.replace(/\/rows$/, "/cases")}/${on.dataset.case}`);
     event.preventDefault();

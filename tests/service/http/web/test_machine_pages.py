@@ -1,0 +1,86 @@
+"""Pages of studies of a machine shaft, with its own results: rows, charts, and what it cannot be asked."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any, Final
+
+import pytest
+
+from sprag.worker import models
+from tests.service.spec.machine.test_shaft import PRESS
+
+if TYPE_CHECKING:
+    from tests.service.conftest import Service
+
+HTML: Final = {"Accept": "text/html"}
+
+
+def computed(service: Service, spec: Any) -> str:
+    """A finished study with the results of its machine."""
+    study_id = service.submit(spec)
+    study, number = service.store.studies.study(study_id), service.store.studies.get(study_id).number
+    epoch = service.store.work.take_over("test")
+    for chunk in service.store.work.claim(epoch, service.store.work.open_chunks(number)):
+        assert service.store.work.commit(epoch, chunk, models.run_chunk(study, chunk.first, chunk.count))
+    service.store.work.settle(epoch, number)
+    return study_id
+
+
+@pytest.fixture
+def chunk_cases() -> int:
+    """All cases at once."""
+    return 200
+
+
+@pytest.fixture
+def press(service: Service) -> str:
+    return computed(service, PRESS)
+
+
+def page(service: Service, address: str, status: int = 200) -> str:
+    answer = service.http.get(address, headers=HTML)
+    assert answer.status_code == status, answer.text
+    return answer.text
+
+
+def test_cases_over_one_cycle_cannot_be_run_longer(service: Service, press: str) -> None:
+    assert "rows/longer" not in page(service, f"/studies/{press}/rows")
+    answer = service.http.post(f"/studies/{press}/rows/longer", data={"case": ["3", "5"]}, headers=HTML)
+    assert answer.status_code == 409
+    assert "over one cycle" in answer.text
+    answer = service.http.post(f"/api/v1/studies/{press}:longer")
+    assert answer.status_code == 409
+    assert "over one cycle" in answer.json()["detail"]
+
+
+def test_rows_begin_with_the_evenest_machine(service: Service, press: str) -> None:
+    text = page(service, f"/studies/{press}/rows?show=irregularity")
+    rows = [float(value) for value in re.findall(r'<td class="num goal">([\d.]+)</td>', text)]
+    assert len(rows) == 25
+    assert rows == sorted(rows)
+    assert "wanted: 0.1<" in text
+    assert 'class="wanted"' in page(service, f"/studies/{press}/rows")
+
+
+def test_rows_lead_beyond_their_page(service: Service, press: str) -> None:
+    text = page(service, f"/studies/{press}/rows")
+    last = re.findall(r'<tr data-case="(\d+)"', text)[-1]
+    text = page(service, f"/studies/{press}/rows?row={last}")
+    assert "No. 25 of 52" in text
+    after = re.search(r'href="(\?[^"]*)" rel="next">next', text)
+    assert after is not None
+    text = page(service, f"/studies/{press}/rows{after[1].replace('&amp;', '&')}")
+    assert "No. 26 of 52" in text
+    before = re.search(r'href="(\?[^"]*)" rel="prev">‹', text)
+    assert before is not None
+    assert f"row={last}" in before[1]
+    assert "skip" not in before[1]
+    assert f'data-row="{last}"' in text
+
+
+def test_numbers_of_an_axis_differ(service: Service, press: str) -> None:
+    text = page(service, f"/studies/{press}/rows?show=irregularity&show=omega.angle_at_min")
+    axis = text[text.index('data-name="omega.angle_at_min"') :]
+    numbers = re.findall(r'class="end">([^<]+)<', axis[: axis.index("</g>")])
+    assert len(set(numbers)) == 3
