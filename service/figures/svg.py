@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from typing import TYPE_CHECKING, Final
 
@@ -34,7 +34,7 @@ from sprag.service.figures.painter.legends import (
     mark_entries,
     rows_of,
 )  # fmt: skip
-from sprag.service.figures.painter.panels import Placed, linked, panel_parts, scale_parts, x_numbers
+from sprag.service.figures.painter.panels import Placed, colour_beside, linked, panel_parts, scale_parts, x_numbers
 from sprag.service.figures.painter.patterns import pattern
 from sprag.service.figures.painter.picture import Painting, panel_group
 from sprag.service.figures.painter.scales import Scale, extent, rounded_scale, tick_text
@@ -327,7 +327,14 @@ class _Painting(Painting):
         listed = [line for line in panel.lines if line.listed and not (named and line.joined)]
         if not (figure.motion or figure.apart) or figure.family or len(listed) < (1 if named else 2):
             return Rows([], 0.0)
-        return rows_of(map(line_entry, listed), column.width + column.numbers)
+        return rows_of(map(line_entry, map(self._seen, listed)), column.width + column.numbers)
+
+    def _seen(self, line: Line) -> Line:
+        """A line as the panels show it: beside the chosen one, grey."""
+        if not self._chosen:
+            return line
+        own = line.key == self._chosen
+        return replace(line, colour=colour_beside(line.key, line.colour, self._chosen), wide=line.wide or own)
 
     def _legend(self, *, named: bool) -> None:
         """The legend of the lines that all panels have: what stands at no curve."""
@@ -336,6 +343,7 @@ class _Painting(Painting):
         listed = [] if own else [line for line in figure.listed if not (named and line.joined and not line.heading)]
         fills = [] if own else [fill for panel in figure.panels for fill in panel.fills if fill.listed]
         heading = ", ".join(map(title_of, figure.family)) or (gettext("Study") if figure.studies > 1 else "")
+        listed = list(map(self._seen, listed))
         if len(listed) > MANY and not any(line.heading for line in listed):
             self._rows(blocks(listed, self._width - 20.0, heading))
         elif len(listed) + len(fills) > (0 if named or figure.family else 1):

@@ -81,10 +81,15 @@ class Placed:
         return self.panel.x or self.figure.x
 
     def colour(self, line_key: str, colour: str) -> str:
-        """The colour of a line, which is grey beside the one that is chosen."""
-        if not self.chosen or line_key == self.chosen:
-            return "var(--ink)" if line_key == self.chosen and self.chosen else colour_of(colour)
-        return "var(--edge)"
+        """The colour of a line."""
+        return colour_beside(line_key, colour, self.chosen)
+
+
+def colour_beside(line_key: str, colour: str, chosen: str) -> str:
+    """The colour of a line: where one is ``chosen``, that one has ink, and the others are grey."""
+    if not chosen:
+        return colour_of(colour)
+    return "var(--ink)" if line_key == chosen else "var(--edge)"
 
 
 def panel_parts(placed: Placed) -> tuple[list[str], list[Named]]:

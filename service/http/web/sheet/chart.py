@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from sprag.service.figures.figure import Figure
     from sprag.service.reading.reader import Reading
     from sprag.service.results.choice import MapQuery
+    from sprag.service.results.curves import Curves
     from sprag.service.results.key_answers import StudyAnswers
     from sprag.service.views.library import Library
     from sprag.service.views.study_view import StudyView
@@ -175,19 +176,30 @@ def _map(
     return Chart(figure, title, "map", urlencode(pairs_of(query)), list(read.held), map=query)
 
 
-def results_of(study: Study, infos: tuple[ResultInfo, ...], params: QueryParams) -> tuple[tuple[str, ...], list[str]]:
-    """The results that are drawn, and those that the lower chart can show: none where others are asked for."""
+def results_of(
+    study: Study, infos: tuple[ResultInfo, ...], params: QueryParams, drawn: Curves
+) -> tuple[tuple[str, ...], list[str]]:
+    """The results that are drawn, and those that the lower chart can show: none where others are asked for.
+
+    What has no number on the ``drawn`` curves, whose first result has some, is not among these.
+    """
     asked = tuple(name for name in params.getlist("y") if name)
     if asked:
         return asked, []
     plan = curve_plan(study)
     known = plan.results if plan is not None else tuple(info.name for info in infos if info.kind != "category")
     first = judged_by(study, known)
+    empty = {name for curve in drawn.curves for name in curve.y if not _numbered(drawn, name)}
+    known = tuple(name for name in known if first in empty or name not in empty)
     others = (*models.presentation_of(study).below, *main_results(study, infos))
     below = list(dict.fromkeys(name for name in others if name in known and name != first))[:4]
     lower = params.get("lower")
     second = lower if lower in below else next(iter(below), None)
     return (first, *([second] if second else ())), below
+
+
+def _numbered(drawn: Curves, name: str) -> bool:
+    return any(np.isfinite(curve.shown(name)).any() for curve in drawn.curves if name in curve.y)
 
 
 def _curves(
@@ -203,7 +215,7 @@ def _curves(
     answers = answers_of_address(library, study_id, params, usual, reading)
     if answers.query is None or answers.drawn is None:
         return None
-    names, below = results_of(study, infos, params)
+    names, below = results_of(study, infos, params, answers.drawn)
     query = replace(answers.query, y=names)
     curves = drawn_curves(library.store, study_id, query)
     figure = curves_figure([("", curves)], 1)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import pytest
 
 from sprag.worker import models
+from tests.service.http.web.test_accessibility import preset
 from tests.service.spec.machine.test_shaft import PRESS
 
 if TYPE_CHECKING:
@@ -84,3 +85,27 @@ def test_numbers_of_an_axis_differ(service: Service, press: str) -> None:
     axis = text[text.index('data-name="omega.angle_at_min"') :]
     numbers = re.findall(r'class="end">([^<]+)<', axis[: axis.index("</g>")])
     assert len(set(numbers)) == 3
+
+
+def test_a_result_without_numbers_has_no_chart(service: Service) -> None:
+    study_id = computed(service, preset("slotter"))
+    text = page(service, f"/studies/{study_id}")
+    assert 'value="energy.fluctuation" checked' in text
+    assert 'name="lower" value="required_inertia"' not in text
+
+
+def test_curves_that_are_not_drawn_can_be(service: Service) -> None:
+    study_id = computed(service, preset("compressor"))
+    text = page(service, f"/studies/{study_id}")
+    assert "All 9 curves (6 are drawn)" in text
+    every = page(service, f"/studies/{study_id}?every=1")
+    select = every[every.index('<select name="curve">') :]
+    assert select[: select.index("</select>")].count("<option") == 9
+
+
+def test_the_legend_looks_as_the_curves_do(service: Service, press: str) -> None:
+    text = page(service, f"/studies/{press}")
+    chart = text[text.index('<figure id="chart"') :]
+    chart = chart[: chart.index("</figure>")]
+    assert "var(--ink)" in chart
+    assert "var(--series-" not in chart
