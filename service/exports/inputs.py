@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from sprag.service.languages import N_
 from sprag.service.reading.catalogue import unit_of
+from sprag.service.spec.derive import formulas_of
 from sprag.service.spec.machine.registry import part_of
 from sprag.worker.directions import SWEEP
 from sprag.worker.models.parameters import parameter_of
@@ -28,7 +29,8 @@ class Input:
     """One parameter of the machine or setting of its run, for a table of inputs.
 
     ``value`` is a number in SI (of a parameter with a tolerance the nominal one), the text of a choice, the formula (in
-    SI numbers) of a derived parameter, or None where the axes change it.
+    SI numbers) of a derived parameter, or None where the axes change it. ``formula`` is the formula as it was written,
+    with the units of its quantities.
     """
 
     path: str
@@ -36,6 +38,7 @@ class Input:
     unit: str
     description: str
     origin: Origin
+    formula: str = ""
 
     @property
     def varies(self) -> bool:
@@ -66,6 +69,7 @@ def inputs(study: Study, spec: Mapping[str, Any]) -> tuple[Input, ...]:
     """
     varying = study.axis_paths
     drawn = () if study.spread is None else study.spread.paths
+    written = formulas_of(spec) if study.derive else {}
     numbers = [
         Input(
             path,
@@ -79,6 +83,7 @@ def inputs(study: Study, spec: Mapping[str, Any]) -> tuple[Input, ...]:
             else "tolerance"
             if path in drawn
             else _origin(spec, path),
+            written.get(path, study.derive.get(path, "")),
         )
         for path in dict.fromkeys((*varying, *study.derive, *study.base))
     ]

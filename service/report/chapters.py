@@ -30,7 +30,7 @@ from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.regimes import counted, left_out
 from sprag.service.results.rounds import sentence
 from sprag.service.results.shown_inputs import choice_name, in_words, run_settings
-from sprag.service.results.varied import in_captions
+from sprag.service.results.varied import formula_in_words, formula_text, in_captions, values_text
 from sprag.service.views.study_questions import CHAPTERS
 from sprag.worker import models
 from sprag.worker.planning.calibrate.plan import CALIBRATE
@@ -44,6 +44,8 @@ Write = Callable[["Report"], Iterator[Block]]
 
 #: Digits of inputs.
 _DIGITS: Final = 8
+#: How the path of a formula begins among what was given.
+_DERIVED: Final = "derive."
 _ORIGINS: Final = {
     "axes": N_("varies"), "given": "", "default": N_("default"), "derived": N_("derived"),
     "fitted": N_("fitted"), "tolerance": N_("varies from drive to drive"),
@@ -120,12 +122,12 @@ def _answer_row(report: Report, item: Found) -> tuple[str, str, str, str]:
 def _axes(report: Report) -> Iterator[Block]:
     read = report.reading
     rows = []
-    for axis in axes_json(report.study):
+    for own, axis in zip(report.study.axes, axes_json(report.study), strict=True):
         least, largest = ends_in_words(axis)
         rows.append(
             (
                 read.caption(" = ".join(axis["paths"])),
-                number(axis["values"]),
+                values_text(report.study, own, read),
                 *(number(read.value(end, axis["unit"])) for end in (least, largest)),
                 unit_text(read.unit(axis["unit"])),
             )
@@ -207,7 +209,8 @@ def _inputs(report: Report) -> Iterator[Block]:
     for item in report.inputs:
         name = read.caption(item.path) if item.unit else choice_name(item)
         origin = _(_ORIGINS.get(item.origin, item.origin))
-        rows.append((name, _value(report, item), unit_text(read.unit(item.unit)), origin, item.path))
+        unit = "" if item.origin == "derived" else unit_text(read.unit(item.unit))  # a formula has its units
+        rows.append((name, _value(report, item), unit, origin, item.path))
     rows += [(_("Run: {name}", name=lower_first(label)), value, "", _(_ORIGINS.get(item.origin, item.origin)),
               f"run.{item.path}") for label, value, item in run_settings(report.study, report.spec, read)]  # fmt: skip
     heads = (_("Parameter"), _("Value"), _("Unit"), _("Origin"), _("Name in specs"))
@@ -220,24 +223,28 @@ def _value(report: Report, item: Input) -> str:
     if item.origin == "axes":
         return _("varies")
     if item.origin == "derived":
-        return in_captions(str(item.value), report.names, report.reading)
+        return formula_text(item, report.reading)
     value = report.reading.value(in_words(item), item.unit)
     return value if isinstance(value, str) else number(value, _DIGITS)
 
 
 def _given(report: Report) -> Iterator[Block]:
-    rows = tuple((_place(report, path), _text(report, text)) for path, text in report.given.items())
+    rows = tuple((_place(report, path), _text(report, path, text)) for path, text in report.given.items())
     if rows:
         yield Table((_("Field"), _("As given")), rows)
 
 
 def _place(report: Report, path: str) -> str:
+    if path.startswith(_DERIVED):
+        return report.reading.caption(path.removeprefix(_DERIVED))
     pointer = f"/{path.replace('.', '/')}"
     return report.reading.place(Place(pointer, path.removeprefix("base.") if report.reading.names == CODES else ""))
 
 
-def _text(report: Report, text: str) -> str:
-    """What was given: a choice in words."""
+def _text(report: Report, path: str, text: str) -> str:
+    """What was given: a choice in words, a formula with names of quantities."""
+    if path.startswith(_DERIVED):
+        return formula_in_words(text, report.reading)
     choice = re.fullmatch("[a-z]+(_[a-z]+)*", text)
     return gettext(words(text)) if choice else in_captions(text, report.names, report.reading)
 

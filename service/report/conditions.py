@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Final
 from sprag.sentences import Amount
 from sprag.service.languages import _
 from sprag.service.reading.catalogue import axes_json
-from sprag.service.reading.reader import Phrase, plural
+from sprag.service.reading.reader import Phrase, joined, plural
 from sprag.service.report.blocks import Section, Table, Text
-from sprag.service.results.varied import ends, in_captions, varied, with_tolerance
+from sprag.service.results.asked import goals_of, limits_of
+from sprag.service.results.varied import ends, formula_text, varied, with_tolerance
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -62,7 +63,11 @@ def values_of(report: Report) -> dict[str, Words]:
 
 
 def _varied(report: Report) -> Iterator[tuple[Words, ...]]:
-    """Each axis: from where to where, and its number of values; what a search or a calibration chooses, the same."""
+    """What a search is asked for; each axis: from where to where, and its values; what is searched, the same."""
+    if report.designs is not None:
+        for title, said in ((_("Goals"), goals_of(report.study)), (_("Limits"), limits_of(report.study))):
+            if said:
+                yield title, joined("; ", said)
     for paths, value in varied(report.study):
         yield report.reading.caption(" = ".join(paths)), with_tolerance(report.study, paths[0], value)
 
@@ -81,6 +86,6 @@ def _of_no_effect(item: Input) -> bool:
 
 def _value(report: Report, item: Input) -> Words:
     if item.origin == "derived":
-        return Phrase("= {formula}", formula=in_captions(str(item.value), report.names, report.reading))
+        return Phrase("= {formula}", formula=formula_text(item, report.reading))
     value = Amount(item.value, item.unit, _DIGITS) if isinstance(item.value, float | int) else str(item.value)
     return with_tolerance(report.study, item.path, value)

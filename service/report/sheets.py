@@ -41,8 +41,8 @@ _PANELS: Final = 2
 _DRAWINGS: Final = 2
 _RESULTS: Final = 5
 _SENTENCES: Final = 4
-#: Key numbers: where there are few, the dimensions of the best design follow them.
-_NUMBERS: Final = 4
+#: Dimensions of the best design, which follow the key numbers.
+_DIMENSIONS: Final = 6
 #: Designs, and their columns.
 _DESIGNS: Final = 6
 _COLUMNS: Final = 9
@@ -73,7 +73,7 @@ def _answer(report: Report) -> Iterator[Block]:
         yield Text(found.said(read), look="answer")
     rows = tuple(
         (one.title(read), f"{one.number(read)} {one.unit_text(read)}".strip(), read.say(one.where or one.note))
-        for one in (*found.numbers, *found.dimensions)[:_NUMBERS]
+        for one in (*found.numbers, *found.dimensions[:_DIMENSIONS])
     )
     if rows:
         yield Table(("", "", ""), rows, look="numbers")

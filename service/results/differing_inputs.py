@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.sentences import Amount, Name
 from sprag.service.exports.inputs import inputs as every_input
 from sprag.service.languages import N_
 from sprag.service.languages import gettext as _
@@ -15,27 +14,25 @@ from sprag.service.reading.catalogue import shown_values, unit_of
 from sprag.service.reading.part_names import part_name, upper_first
 from sprag.service.reading.reader import Phrase, joined, model_title, plural, shown, term
 from sprag.service.reading.wording import number, typed_text, unit_text
+from sprag.service.results.asked import goals_of, limits_of
 from sprag.service.results.calibration import plan_of
-from sprag.service.results.fronts import goal_of
 from sprag.service.results.shown_inputs import choice_name, in_words, run_settings
-from sprag.service.results.varied import in_captions, names_in_files, varied, with_tolerance
+from sprag.service.results.varied import formula_text, in_captions, names_in_files, varied, with_tolerance
 from sprag.service.spec.described import Described
 from sprag.service.spec.kinds.calibrate import CALIBRATE as CALIBRATION
 from sprag.service.spec.kinds.goal import GOAL as SEARCH
 from sprag.service.spec.kinds.refine import REFINE as REFINEMENT
-from sprag.worker import models
 from sprag.worker.directions import SWEEP, direction
 from sprag.worker.planning.calibrate.plan import CALIBRATE
 from sprag.worker.planning.goals.plan import GOAL
 from sprag.worker.planning.refine_plan import REFINE, RefinePlan
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
     from sprag.service.exports.inputs import Input
     from sprag.service.reading.reader import Reading
     from sprag.service.results.varied import Text
-    from sprag.worker.planning.goals.plan import Goal, Limit
     from sprag.worker.study import Axis, Study
 
 #: Characters of an input in the table.
@@ -149,11 +146,10 @@ def _machine(one: ReadStudy) -> Iterator[tuple[str, _Cell]]:
         for path in paths:
             known.add(path)
             yield path, _toleranced(one, path, _Cell(reading.caption(path), value, _said(text, reading), full), text)
-    names = names_in_files(item.path for item in every)
     for item in every:
         if item.path not in known:
             caption = reading.caption(item.path) if item.unit else choice_name(item)
-            text = _text(item, names, reading)
+            text = _text(item, reading)
             yield item.path, _toleranced(one, item.path, _Cell(caption, item.value, text), text)
 
 
@@ -185,12 +181,11 @@ def _values(study: Study, axis: Axis, reading: Reading) -> str:
     return f"{text} ({reading.say(plural('{count} value', '{count} values', len(values)))})"
 
 
-def _text(item: Input, names: Container[str], reading: Reading) -> str:
+def _text(item: Input, reading: Reading) -> str:
     if item.varies:
         return _("varies")
     if isinstance(item.value, str):
-        derived = item.origin == "derived"
-        return f"= {in_captions(item.value, names, reading)}" if derived else str(in_words(item))
+        return f"= {formula_text(item, reading)}" if item.origin == "derived" else str(in_words(item))
     return reading.quantity(item.value, item.unit, _DIGITS)
 
 
@@ -198,10 +193,9 @@ def _asked(one: ReadStudy) -> Iterator[tuple[str, _Cell]]:
     """What is searched, refined or calibrated."""
     study, reading, plan = one.study, one.reading, one.study.plan or {}
     if plan.get("kind") == GOAL:
-        goal = goal_of(study)
         texts = {
-            "goal.best": (N_("Goals"), [_goal(own) for own in goal.best]),
-            "goal.subject_to": (N_("Limits"), [_limit(study, own) for own in goal.subject_to]),
+            "goal.best": (N_("Goals"), goals_of(study)),
+            "goal.subject_to": (N_("Limits"), limits_of(study)),
         }
         for path, (caption, said) in texts.items():
             if said:
@@ -216,24 +210,6 @@ def _asked(one: ReadStudy) -> Iterator[tuple[str, _Cell]]:
         values = sum(len(own.values) for own in plan_of(study).measured)
         csv = one.spec["calibrate"]["measured"]["csv"]
         yield "calibrate.measured", _Cell(_("Measured values"), csv, number(values))
-
-
-def _goal(goal: Goal) -> Phrase:
-    name = Name(goal.name, within=True)
-    return Phrase("Largest {name}", name=name) if goal.max else Phrase("Smallest {name}", name=name)
-
-
-def _limit(study: Study, limit: Limit) -> Phrase:
-    info = next((own for own in models.study_results(study) if own.name == limit.result), None)
-    unit = models.SHARE if info is None else info.unit
-    cell = limit.value if info is None else info.cell(limit.value)
-    value = term(cell) if isinstance(cell, str) else Amount(limit.value, unit)
-    texts = {
-        "at_least": Phrase("{name} at least {value}", name=Name(limit.name), value=value),
-        "at_most": Phrase("{name} at most {value}", name=Name(limit.name), value=value),
-        "is": Phrase("{name} = {value}", name=Name(limit.name), value=value),
-    }
-    return texts[limit.kind]
 
 
 def _settings(one: ReadStudy, shared: Collection[str]) -> Iterator[tuple[str, _Cell]]:

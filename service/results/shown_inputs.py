@@ -13,6 +13,7 @@ from sprag.service.languages import N_, _, decimal, gettext, grouped, ngettext
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.part_names import NUMBERED, lower_first, part_name, run_name
 from sprag.service.reading.wording import number, unit_text, words
+from sprag.service.results.varied import formula_text, values_text
 from sprag.service.spec.described import ANY_RUN, DURATION, SETTLED_RUN
 from sprag.worker.models.parameters import parameter_of
 
@@ -29,17 +30,25 @@ _YES_NO: Final = {"true": N_("yes"), "false": N_("no")}
 _COUNT: Final = re.compile(r"(\d+) (period|revolution)s?")
 
 
-def inputs(study: Study, spec: Mapping[str, Any]) -> list[tuple[str, list[dict[str, Any]]]]:
+def inputs(study: Study, spec: Mapping[str, Any], reading: Reading) -> list[tuple[str, list[dict[str, Any]]]]:
     """Every parameter of the base by section, with letter, value, unit and origin."""
     sections: dict[str, list[dict[str, Any]]] = {}
     for item in every_input(study, spec):
         entry = parameter_of(study, item.path)
         section, _dot, name = item.path.rpartition(".")
         symbol = f"c_{int(name) + 1}" if name.isdigit() else "" if entry is None else entry.symbol
-        shown = item if item.origin == "derived" else replace(item, value=in_words(item))
-        code = item.value if _is_code(item.value) and shown is not item else ""
+        derived = item.origin == "derived"  # a formula has its units
+        value = formula_text(item, reading) if derived else in_words(item)
+        shown = replace(item, value=value, unit="" if derived else item.unit)
+        code = item.value if _is_code(item.value) and not derived else ""
         sections.setdefault(section, []).append({"name": name, "symbol": symbol, "item": shown, "code": code})
     return [(part_name(section), rows) for section, rows in sections.items()]
+
+
+def varying(study: Study, spec: Mapping[str, Any], reading: Reading) -> tuple[list[str], list[tuple[str, str]]]:
+    """The values of each axis; the path and the formula of each derived parameter."""
+    derived = [(item.path, formula_text(item, reading)) for item in every_input(study, spec) if item.formula]
+    return [values_text(study, axis, reading) for axis in study.axes], derived
 
 
 def choice_name(item: Input) -> str:

@@ -34,7 +34,7 @@ from sprag.service.reading.directions import ends_in_words
 from sprag.service.reading.reader import meanings, reading_for
 from sprag.service.results.defaults import no_curves
 from sprag.service.results.regimes import DOUBTFUL
-from sprag.service.results.shown_inputs import inputs, run_settings
+from sprag.service.results.shown_inputs import inputs, run_settings, varying
 from sprag.service.spec.narrow import narrowed_cases
 from sprag.service.storage.studies.records import Kinds
 from sprag.service.views.headline import is_small
@@ -162,7 +162,8 @@ def _study_page(
         view_actions=view_actions(),
         only_row=None if first is None else first.results.items(),
         units={info.name: info.unit for info in models.study_results(study)},
-        inputs=inputs(study, frame["study"]["spec"]),
+        inputs=inputs(study, frame["study"]["spec"], frame["reading"]),
+        varying=varying(study, frame["study"]["spec"], frame["reading"]),
         run=run_settings(study, frame["study"]["spec"], frame["reading"]),
         fits=fits,
         regimes=kinds.regimes,

@@ -1,0 +1,98 @@
+"""What was given, varied and searched, as a document and the page of a study print it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from sprag.service import languages
+from sprag.service.reading.reader import Choice, Reading
+from sprag.service.report.blocks import Document, Table
+from sprag.service.report.document import document_of
+from sprag.service.results.shown_inputs import inputs, varying
+from sprag.service.results.varied import listed
+from sprag.service.views.library import Library
+from sprag.service.views.study_questions import ReportQuestion
+from tests.service.searching import search
+
+if TYPE_CHECKING:
+    from tests.service.conftest import Service
+
+FORMULA = "1.1 * pendulums.0.mass * pendulums.0.arm^2 + 5e-4 kg*m^2 - 2 g*mm^2"
+PRINTED = "1.1 · (mass, pendulum 0) · (arm of the mass, pendulum 0)² + 0.0005 kg·m² − 2 g·mm²"
+
+
+def rows(document: Document) -> list[tuple[str, ...]]:
+    """The rows of all tables of a document."""
+    return [
+        tuple(map(str, row))
+        for section in document.sections
+        for block in section.blocks
+        if isinstance(block, Table)
+        for row in block.rows
+    ]
+
+
+def document(service: Service, study_id: str, **question: Any) -> Document:
+    """The document of a study in the units of a workshop."""
+    return document_of(Library(service.store), study_id, Choice("workshop"), ReportQuestion(**question))
+
+
+def derived(service: Service, spec: dict[str, Any]) -> str:
+    """A study of which an inertia is a formula."""
+    del spec["base"]["pendulums"][0]["inertia"]
+    return service.submit(spec | {"derive": {"pendulums.0.inertia": FORMULA}})
+
+
+def test_a_formula_keeps_the_units_it_was_written_with(service: Service, spec: dict[str, Any]) -> None:
+    study_id = derived(service, spec)
+    service.fill(study_id)
+    found = rows(document(service, study_id, appendix=["inputs", "given"]))
+    assert [row[1:] for row in found if row[0] == "Inertia, pendulum 0"] == [
+        (f"= {PRINTED}",), (PRINTED, "", "derived"), (PRINTED,)
+    ]  # fmt: skip
+    study = service.store.studies.study(study_id)
+    written, reading = service.store.studies.spec(study_id), Reading(study.model)
+    (item,) = (row["item"] for _, part in inputs(study, written, reading) for row in part if row["item"].formula)
+    assert (item.value, item.unit) == (PRINTED, "")
+    assert varying(study, written, reading)[1] == [("pendulums.0.inertia", PRINTED)]
+    coded = Reading(study.model, names="codes")
+    assert varying(study, written, coded)[1] == [("pendulums.0.inertia", FORMULA)]
+    page = service.http.get(f"/studies/{study_id}?units=workshop").text
+    assert page.count(PRINTED) == 2
+    assert "0.0005</" not in page
+
+
+@pytest.mark.parametrize(
+    ("values", "printed", "count"),
+    [
+        (["0 N*m", "0.1 N*m", "0.2 N*m", "0.4 N*m"], "0; 0.1; 0.2; 0.4 N·m", "0; 0.1; 0.2; 0.4"),
+        (["0 N*m", "0.1 N*m", "0.2 N*m", "0.3 N*m"], "0 to 0.3 N·m, 4 values", "4"),
+        ([f"{n * n} N*mm" for n in range(1, 11)], "10 values from 0.001 to 0.1 N·m, unequal", "10, unequal"),
+    ],
+)
+def test_only_evenly_divided_values_are_told_as_a_range(
+    service: Service, spec: dict[str, Any], values: list[str], printed: str, count: str
+) -> None:
+    study_id = service.submit(spec | {"axes": [{"path": "shaft.load", "values": values}]})
+    service.fill(study_id)
+    found = [row[1] for row in rows(document(service, study_id, appendix=["axes"])) if row[0] == "Load torque"]
+    assert found == [printed, count]
+    assert f'<td class="num">{count}</td>' in service.http.get(f"/studies/{study_id}").text
+
+
+def test_a_catalogue_of_a_search_is_its_values() -> None:
+    text = listed((0.001, 0.002, 0.01), "kg*m^2")
+    with languages.language("uk"):
+        assert Reading("vibration-drive").say(text) == "0,001; 0,002; 0,01 кг·м²"
+
+
+def test_a_search_tells_what_it_was_asked_for_and_all_of_the_best_design(service: Service) -> None:
+    told = document(service, search(service))
+    found = dict(row[:2] for row in rows(told))
+    assert found["Goals"] == "Largest efficiency; Smallest irregularity"
+    assert found["Limits"].startswith("Mean shaft speed = ")
+    assert found["Inertia of the driven side"] == "10; 20 kg·cm², searched"
+    first = {str(row[0]) for block in told.sections[0].blocks if isinstance(block, Table) for row in block.rows}
+    assert {"Efficiency", "Excitation frequency", "Horizontal amplitude", "Inertia of the driven side"} <= first
