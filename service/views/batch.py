@@ -13,6 +13,7 @@ from sprag.service.reading.reader import Phrase, joined, plural
 from sprag.service.results.tolerances.nominal import deviations
 from sprag.service.results.tolerances.told import at_line, yield_sentence
 from sprag.service.results.tolerances.written import percent
+from sprag.service.results.tolerances.yields import WANTED
 from sprag.service.views.shown import Column, Shown, ShownTable
 
 if TYPE_CHECKING:
@@ -91,20 +92,29 @@ def _unfinished(one: YieldLine) -> Iterator[str]:
 def _causes_table(study: Study, causes: Causes, title: Phrase, good: YieldLine | None = None) -> ShownTable | None:
     """The shares that tolerances have of a variance, the largest first; None where none is known.
 
-    With a yield that is neither all nor none, also that of the drives that are nearest to nominal in each tolerance.
+    With a yield that is neither all nor none, also that of the drives that are nearest to nominal in each tolerance,
+    and how near they have to be for the wanted one.
     """
-    tolerances = () if study.spread is None else study.spread.names
-    partial = good is not None and 0.0 < float(good.whole.value) < 1.0
-    nearest = [100.0 * value for value in good.nearest.value.tolist()] if good is not None and partial else []
-    known = [(share, name, at) for at, (name, share) in enumerate(zip(tolerances, causes.shares, strict=True)) if share]
+    tolerances = () if study.spread is None else study.spread.tolerances
+    columns = [Column(Phrase("Tolerance")), Column(Phrase("Share"), "%", 3), Column(Phrase("±"), "%", 2)]
+    further: list[list[Cell]] = [[] for _ in tolerances]
+    if good is not None and 0.0 < float(good.whole.value) < 1.0:
+        columns.append(Column(Phrase("Yield of the half nearest to nominal"), "%", 3))
+        further = [[100.0 * value] for value in good.nearest.value.tolist()]
+        if good.whole.value < WANTED:
+            columns.append(Column(Phrase("{share} % are good within", share=Amount(100.0 * WANTED, "1", bare=True))))
+            for cells, own, size in zip(further, tolerances, good.within.tolist(), strict=True):
+                cells.append(
+                    Phrase("not by it alone") if math.isnan(size) else joined("", ("±", _size(study, own, size)))
+                )
+    every = zip(tolerances, causes.shares, further, strict=True)
+    known = [(share, own.name, cells) for own, share, cells in every if share is not None]
     rows: list[list[Cell]] = [
-        [joined("", [Name(name)]), 100.0 * max(share.value, 0.0), 100.0 * share.error, *nearest[at : at + 1]]
-        for share, name, at in sorted(known, key=lambda item: item[0].value, reverse=True)
+        [joined("", [Name(name)]), 100.0 * max(share.value, 0.0), 100.0 * share.error, *cells]
+        for share, name, cells in sorted(known, key=lambda item: item[0].value, reverse=True)
     ]
     if rows and causes.rest is not None:
-        rows.append([Phrase("Several together"), 100.0 * causes.rest, None, *([None] if nearest else [])])
-    columns = [Column(Phrase("Tolerance")), Column(Phrase("Share"), "%", 3), Column(Phrase("±"), "%", 2)]
-    columns += [Column(Phrase("Yield of the half nearest to nominal"), "%", 3)] if nearest else []
+        rows.append([Phrase("Several together"), 100.0 * causes.rest, *[None, None, ""][: len(columns) - 2]])
     return ShownTable(title, columns, rows) if rows else None
 
 
@@ -174,11 +184,19 @@ def _worst_table(found: Yield, one: YieldLine, causes: Causes) -> ShownTable:
 
 def _change(study: Study, tolerance: Tolerance, apart: float) -> Phrase:
     """How far a drive is from nominal in a tolerance."""
-    scaled = tolerance.change == "scale"
-    size = Amount(100.0 * abs(apart), "%", 3) if scaled else Amount(abs(apart), unit_of(study, tolerance.paths[0]), 3)
+    size = _size(study, tolerance, abs(apart))
     if apart < 0.0:
         return Phrase("{name}: {amount} less", name=Name(tolerance.name), amount=size)
     return Phrase("{name}: {amount} more", name=Name(tolerance.name), amount=size)
+
+
+def _size(study: Study, tolerance: Tolerance, size: float) -> Amount:
+    """The size of a deviation from nominal: a share of the value, or SI."""
+    return (
+        Amount(100.0 * size, "%", 3)
+        if tolerance.change == "scale"
+        else Amount(size, unit_of(study, tolerance.paths[0]), 3)
+    )
 
 
 def _drawn(own: Tolerance, draws: Mapping[str, float]) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -24,6 +24,13 @@ if TYPE_CHECKING:
     from sprag.worker.study import Study
 
     Numbers = NDArray[np.float64]
+
+
+#: The share of good drives for which it is told how near to nominal they have to be, and the fewest that tell it: so
+#: many, and this part of all. Of fewer ones it would often be reached by chance.
+WANTED: Final = 0.9
+_FEWEST: Final = 20
+_PART: Final = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +59,8 @@ class YieldLine:
     nominal : bool array, shape (places,): whether the nominal drive does
     failed, pending : drives without one of the results, and those that are not run yet; shape (places,)
     nearest : for each tolerance the share at every place of that half of the drives that is nearest to nominal in it
+    within : for each tolerance how near to nominal drives are of which `WANTED` are good, a share of the value or SI;
+        NaN where that is not enough, shape (tolerances,)
     causes : shares of the variance of reaching the conditions at every place
     worst : the drives with the least margins
     """
@@ -63,6 +72,7 @@ class YieldLine:
     failed: NDArray[np.int64]
     pending: NDArray[np.int64]
     nearest: Proportion
+    within: Numbers
     causes: Causes
     worst: tuple[WorstDrive, ...]
 
@@ -120,6 +130,7 @@ def _line(places: Places, line: Line, conditions: tuple[Condition, ...], worst: 
         failed,
         pending,
         _nearest(places.study, good, every),
+        _within(places.study, good, every),
         variance_causes(places.study, indicator),
         tuple(whole.worst(places.study, worst)),
     )
@@ -129,6 +140,16 @@ def _nearest(study: Study, good: NDArray[np.bool_], run: NDArray[np.bool_]) -> P
     """The share of good drives among the half of the ``run`` ones that is nearest to nominal in each tolerance."""
     order = np.argsort(np.abs(deviations(study)[run]), axis=0, kind="stable")[: (run.sum() + 1) // 2]
     return proportion(good[run][order].sum(axis=0), np.full(order.shape[1], len(order)))
+
+
+def _within(study: Study, good: NDArray[np.bool_], run: NDArray[np.bool_]) -> Numbers:
+    """The largest distance from nominal, in each tolerance, of drives of which the wanted share is good."""
+    size = np.abs(deviations(study)[run])
+    order = np.argsort(size, axis=0, kind="stable")
+    counts = np.arange(1, len(order) + 1)[:, None]
+    enough = (np.cumsum(good[run][order], axis=0) >= WANTED * counts) & (counts >= max(_FEWEST, _PART * len(order)))
+    farthest = np.where(enough, np.take_along_axis(size, order, axis=0), -np.inf).max(axis=0, initial=-np.inf)
+    return np.where(np.isfinite(farthest), farthest, np.nan)
 
 
 class _Whole:

@@ -250,6 +250,22 @@ def test_of_the_half_nearest_to_nominal_as_many_are_good_as_the_closed_form_says
     assert f'<td class="num">{100.0 * line.nearest.value[0]:.3g}</td>' in rows
 
 
+def test_drives_of_which_nine_of_ten_are_good_are_as_near_to_nominal_as_the_closed_form_says(service: Service) -> None:
+    study_id = finish(service, {**SPEC, "axes": [], "drives": 4096})
+    own = service.store.studies.study(study_id)
+    found = yields(own, models.study_results(own), ["speed >= 55 m"], Asked(), 0, partial(
+        service.store.rows.for_cases, study_id))  # fmt: skip
+    (line,) = found.lines
+    # A first parameter within so many standard deviations of 1 m; the base is 59 m.
+    within = norm.cdf(line.within[0])
+    score = norm.ppf(np.linspace(1.0 - within, within, 1001))
+    assert norm.cdf((4.0 + 3.0 * score) / np.sqrt(5.0)).mean() == pytest.approx(0.9, abs=0.01)
+    assert np.isnan(line.within[2]), "the third is not what makes drives bad"
+    page = service.http.get(f"/studies/{study_id}/matters", params={"condition": "speed >= 55 m", "units": "si"}).text
+    assert f"<td>±{line.within[0]:.3g} m</td>" in page.replace("\N{NO-BREAK SPACE}", " ")
+    assert "not by it alone" in page
+
+
 def test_a_page_begins_with_the_side_of_the_nominal_drive_that_is_worse() -> None:
     shaft = parse_spec(load_spec(preset_text("press")[1], "toml")).study
     drive = parse_spec(load_spec(preset_text("one_pendulum")[1], "json")).study
