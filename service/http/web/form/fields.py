@@ -129,19 +129,20 @@ class Choice:
 Groups = list[tuple[str, list[Choice]]]
 
 
-def result_choices(model: str, rows: Callable[[str], int], *, numbers: bool = False) -> Groups:
-    """The results that a search can ask for, by group; with ``numbers`` no categories.
+def result_choices(reading: Reading, rows: Callable[[str], int], *, numbers: bool = False) -> Groups:
+    """The results that a search can ask for, by group, as a reader knows them; with ``numbers`` no categories.
 
     ``rows`` is the number of rows of each list of the machine.
     """
     groups: dict[str, list[Choice]] = {}
-    for entry in models.result_catalogue(model):
+    for entry in models.result_catalogue(reading.model):
         first, indexed, _rest = entry.name.partition(".N.")
         for index in range(rows(first) if indexed else 1):
             name = entry.name.replace(".N.", f".{index}.")
-            group = words(".".join(name.split(".")[: 2 if indexed else 1]))
+            group = words(".".join(name.split(".")[:2])) if indexed else N_("Machine")
             if not (numbers and entry.kind == "category"):
-                groups.setdefault(_(group), []).append(Choice(name, label_of(name, model), entry.unit))
+                choice = Choice(name, reading.caption(name), reading.unit(entry.unit))
+                groups.setdefault(_(group), []).append(choice)
     return list(groups.items())
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from typing import Any, Final
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, Final
 
 from sprag.service.http.web.form.entries import (
     Faults,
@@ -14,10 +14,18 @@ from sprag.service.http.web.form.entries import (
     text_of,
     unclear,
 )
-from sprag.service.http.web.form.parts import PARTS
+from sprag.service.http.web.form.machine import model_name
+from sprag.service.http.web.form.parts import PARTS, count_of
 from sprag.service.http.web.form.rows import field_of_row, filled, items_of_part, values_of_part
 from sprag.service.languages import _
+from sprag.service.reading.numbers import in_language, parse_number
+from sprag.service.reading.together import with_last_unit
+from sprag.service.reading.units import exact_quantity
 from sprag.service.spec.kinds.goal import GOAL
+from sprag.worker import models
+
+if TYPE_CHECKING:
+    from sprag.service.reading.reader import Reading
 
 #: What a search asks for in a form that was not about one.
 GOAL_DEFAULTS: Final[Values] = {
@@ -44,6 +52,42 @@ def goal_of(values: Mapping[str, str], faults: Faults) -> dict[str, Any]:
         found["over"] = values["/goal/over"]
     found |= {name: plain(text) for name in _NUMBERS if (text := values.get(f"/goal/{name}", "").strip())}
     return found | ({} if values.get("/goal/polish") == "on" else {"polish": False})
+
+
+def with_shown_units(values: Values, reading: Reading) -> None:
+    """Give each bare number of a limit the unit that the page shows beside the name of its result."""
+    for row, unit in _limits(values):
+        own = [name for name in ("value", "within") if values.get(f"{row}/{name}", "").strip()]
+        texts = with_last_unit([values[f"{row}/{name}"] for name in own])
+        if reading.unit(unit) == unit:
+            continue
+        for name, text in zip(own, texts, strict=True):
+            # A percentage is a share of the value there.
+            if parse_number(in_language(text)) is not None and not (name == "within" and unit == "1"):
+                values[f"{row}/{name}"] = reading.typed(text, unit)
+
+
+def with_own_units(values: Mapping[str, str], reading: Reading) -> Values:
+    """A form whose limits are not taken in the shown units: those that are bare numbers in SI have their unit."""
+    shown = dict(values)
+    for row, unit in _limits(values):
+        if reading.unit(unit) == unit:
+            continue
+        for name in ("value",) if unit == "1" else ("value", "within"):
+            number = parse_number(in_language(values.get(f"{row}/{name}", "")))
+            if number is not None:
+                shown[f"{row}/{name}"] = exact_quantity(number, unit, "%" if unit == "1" else unit)
+    return shown
+
+
+def _limits(values: Mapping[str, str]) -> Iterator[tuple[str, str]]:
+    """The rows of limits on numbers, with the SI unit of their result."""
+    units = {entry.name: entry.unit for entry in models.result_catalogue(model_name(values)) if entry.kind == "real"}
+    for index in range(count_of(values, "subject_to")):
+        row = f"{PARTS['subject_to'].pointer}/{index}"
+        name = re.sub(r"\.\d+\.", ".N.", values.get(f"{row}/result", ""))
+        if name in units:
+            yield row, units[name]
 
 
 def _points(values: Mapping[str, str], faults: Faults) -> list[dict[str, Any]]:

@@ -40,7 +40,7 @@ from sprag.service.http.web.form.fields import (
     run_fields,
     search_fields,
 )
-from sprag.service.http.web.form.goal import GOAL_DEFAULTS
+from sprag.service.http.web.form.goal import GOAL_DEFAULTS, with_own_units, with_shown_units
 from sprag.service.http.web.form.live import live_answer, named_numbers
 from sprag.service.http.web.form.machine import BASE, choices_of, entries, form_of, model_name
 from sprag.service.http.web.form.machine_spec import base_of, values_of_base
@@ -48,7 +48,7 @@ from sprag.service.http.web.form.own_machine import own_spec
 from sprag.service.http.web.form.parts import count_of, parts_of, reshape, share, unshared
 from sprag.service.http.web.form.rows import LIMITS
 from sprag.service.http.web.form.sent import let_vary, settle
-from sprag.service.http.web.form.sheet import Sheet, sheet_of
+from sprag.service.http.web.form.sheet import Sheet, preferred, sheet_of
 from sprag.service.http.web.form.spec import REFINE_DEFAULTS, is_search, values_of
 from sprag.service.http.web.form.tolerances import BATCH, OWN, distributions, drive_fields, own_name, with_batch
 from sprag.service.http.web.form.undo import history_of, remember, undo
@@ -58,6 +58,8 @@ from sprag.service.http.work import Attended, Work
 from sprag.service.jobs.submission import Submission, take_in
 from sprag.service.presets import preset_names
 from sprag.service.reading.numbers import whole_number
+from sprag.service.reading.quantities import Units
+from sprag.service.reading.reader import Reading
 from sprag.service.reading.together import split_list
 from sprag.service.reading.units import QuantityError, parse_quantity
 from sprag.service.spec.design import design_spec
@@ -204,13 +206,14 @@ async def send_form(context: Ctx, work: Attended, request: Request, values: Form
     """Perform the pressed button: check the form, add or remove parts, or submit the study."""
     wanted = values.pop("do", "check")
     if wanted == "undo":
+        with_shown_units(values, _reading(values))
         undo(values)
         settle(values, with_ticks=False)
         return await in_thread(form_page, request, values, await look_over(context, work, values))
     before = values
     if "/text" not in values:
         before = unshared(_without_ticks(values))
-        settle(values)
+        _settle(values)
         share(values)
     if wanted == "submit":
         checked, made = await work.check(study_check.form_study, context.library, values, context.store.clock.now())
@@ -246,7 +249,8 @@ def _submit(context: Context, request: Request, values: Values, checked: Checked
 @router.post("/new/check")
 async def check(context: Ctx, work: Attended, request: Request, values: Form) -> Response:
     """The live preview: faults and warnings by field, and the panel with cases, time, size and fits."""
-    settle(values)
+    if "/text" not in values:
+        _settle(values)
     checked = await look_over(context, work, values)
 
     def answer() -> dict[str, Any]:
@@ -293,12 +297,14 @@ def sheet_form(request: Request, values: Values, checked: Checked | None) -> dic
     """
     begun, checked = checked is not None, checked or Checked({})
     text_mode, model, own = "/text" in values, model_name(values), form_of(values)
+    reading = _reading(values)
+    values = values if text_mode else with_own_units(values, reading)
     parts = parts_of(values)
     sheet = None if text_mode else _sheet(request, values, checked)
     rows = {} if text_mode else {name: range(count_of(values, name)) for name in parts}
 
     def results(*, numbers: bool = False) -> Groups:
-        return result_choices(model, lambda name: len(rows.get(name, ())), numbers=numbers)
+        return result_choices(reading, lambda name: len(rows.get(name, ())), numbers=numbers)
 
     return {
         "values": values,
@@ -335,6 +341,18 @@ def sheet_form(request: Request, values: Values, checked: Checked | None) -> dic
         "sample_methods": methods(),
         "exclusion_kinds": kinds(),
     }
+
+
+def _reading(values: Values) -> Reading:
+    """The reading of a form: the units of a workshop for those as they were typed."""
+    model, choice = model_name(values), current().choice
+    return Reading(model, Units(preferred(choice.units, model)), choice.names)
+
+
+def _settle(values: Values) -> None:
+    """Read units and ticks into the fields that they are about, and bare numbers of limits in the units shown."""
+    settle(values)
+    with_shown_units(values, _reading(values))
 
 
 def _sheet(request: Request, values: Values, checked: Checked) -> Sheet:
@@ -382,6 +400,7 @@ def _without_ticks(values: Values) -> Values:
     """A form as it was before its ticks were pressed."""
     found = dict(values)
     settle(found, with_ticks=False)
+    with_shown_units(found, _reading(found))
     return found
 
 

@@ -8,13 +8,17 @@ from typing import Any
 import pytest
 
 from sprag.service.http.web.form.check import check_form
+from sprag.service.http.web.form.goal import with_own_units, with_shown_units
 from sprag.service.http.web.form.page import empty
 from sprag.service.http.web.form.parts import reshape
 from sprag.service.http.web.form.sent import settle
 from sprag.service.http.web.form.spec import field_of, spec_of, values_of
 from sprag.service.presets import preset_text
+from sprag.service.reading.quantities import Units
+from sprag.service.reading.reader import Reading
 from sprag.service.spec.document import load_spec, parse_spec
 from sprag.worker.chunking import Chunking
+from sprag.worker.models import SHARE
 from tests.service.conftest import Service
 from tests.service.http.web.controls import Controls
 
@@ -154,3 +158,27 @@ def test_an_empty_form_can_become_a_search(service: Service) -> None:
     assert (shown["vary"], shown["best"], shown["/goal/best/0/toward"]) == ("1", "1", "max")
     assert (shown["/goal/population"], shown["/goal/polish"]) == ("100", "on")
     assert shown["axes"] == "0"
+
+
+def test_limits_are_named_and_taken_in_the_units_of_the_reader(service: Service) -> None:
+    limits = [
+        {"result": "shaft.speed.mean", "is": 8, "within": "2 %"}, {"result": "efficiency", "at_least": 0.25},
+        {"result": "torque.max", "at_most": 3},
+    ]  # fmt: skip
+    sent = {**empty("vibration-drive"), **values_of(searching(subject_to=limits)), "do": "check"}
+    page = service.http.post("/new", data={**sent, "/goal/subject_to/0/value": "493"}).text
+    assert ">Mean shaft speed (rpm)</option>" in page
+    assert "Shaft speed mean" not in page
+    shown = Controls(page).values
+    assert shown["/goal/subject_to/0/value"] == "493 rpm"
+    # What is not typed on the page, such as a spec, is in SI.
+    shown = Controls(service.http.get("/new?preset=fastest_drive").text).values
+    assert shown["/goal/subject_to/0/value"] == "3 N*m"
+    values = values_of(searching(subject_to=limits))
+    reading = Reading("vibration-drive", Units({"rad/s": "rpm", SHARE: "%"}))
+    rendered = with_own_units(values, reading)
+    assert [rendered[f"/goal/subject_to/{place}/value"] for place in range(3)] == ["8 rad/s", "25 %", "3"]
+    with_shown_units(rendered, reading)
+    rendered |= {"/goal/subject_to/1/value": "25"}
+    with_shown_units(rendered, reading)
+    assert parse_spec(spec_of(rendered)[0]).study.plan == parse_spec(searching(subject_to=limits)).study.plan
