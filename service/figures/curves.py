@@ -34,7 +34,7 @@ _LEAST_POINTS: Final = 400
 _LINE_POINTS: Final = 6_000
 
 
-def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1) -> Figure:
+def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1, *, apart: str = "") -> Figure:
     """Curves of one study, or of several that are overlaid: a panel for each result.
 
     Parameters
@@ -43,11 +43,15 @@ def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1) -> Figu
         All with the same x and the same results; one study alone has the label "".
     columns : int
         Panels side by side.
+    apart : str
+        Name of the parameter whose values the labels of studies are.
     """
     chosen = drawn[0][1].selection
     x = Quantity(chosen.names[chosen.x], chosen.units[chosen.x])
     lines = [(study, curve) for study, (_, curves) in enumerate(drawn) for curve in curves.curves]
     family = tuple(Quantity(chosen.names[path], chosen.units[path]) for path in chosen.lines[0].by)
+    if apart and not family:
+        family = (Quantity(apart, "1"),)
     occurring = tuple(regimes_of(_regimes(curve) for _, curve in lines))
     regimes = occurring if len(occurring) > 1 or set(occurring) & set(MARKED) else ()
     labels = [label for label, _ in drawn]

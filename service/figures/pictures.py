@@ -50,12 +50,13 @@ def draw_curves(curves: Curves, title: str, picture: Picture, reading: Reading) 
     return draw_figure(read_figure(curves_figure([("", curves)], 2), reading), title, picture)
 
 
-def draw_compare(drawn: Sequence[tuple[str, Curves]], reading: Reading, picture: Picture) -> bytes:
-    """Curves of several studies with their names, a plot for each result; raises SelectionError as
-    `draw_curves` does.
+def draw_compare(drawn: Sequence[tuple[str, Curves]], reading: Reading, picture: Picture, *, apart: str = "") -> bytes:
+    """Curves of several studies with their names, which are values of ``apart`` where it is given.
+
+    A plot for each result; raises SelectionError as `draw_curves` does.
     """
     require_drawable([curves for _, curves in drawn])
-    return draw_figure(read_figure(curves_figure(drawn), reading), "", picture)
+    return draw_figure(read_figure(curves_figure(drawn, apart=apart), reading), "", picture)
 
 
 def draw_map(drawn: Map, title: str, picture: Picture, *, contours: bool = False) -> bytes:

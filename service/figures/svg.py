@@ -348,7 +348,7 @@ class _Painting(Painting):
             self._rows(blocks(listed, self._width - 20.0, heading))
         elif len(listed) + len(fills) > (0 if named or figure.family else 1):
             self._rows(rows_of([*map(fill_entry, fills), *grouped(listed)], self._width - 8.0, heading))
-        elif heading and named:
+        elif figure.family and named:
             self._text(gettext("A curve for each: {quantities}", quantities=heading))
 
 

@@ -19,7 +19,7 @@ from sprag.worker.planning.goals.plan import GOAL
 from sprag.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from sprag.service.reading.reader import Phrase
     from sprag.service.storage.studies.records import StudyRecord
@@ -72,13 +72,23 @@ def relatives_of(library: Library, study_id: str) -> tuple[Relative, ...]:
         if record.id == study_id or not record.ok:
             continue
         other = library.store.studies.study(record.id)
-        differs = _differs(study, other)
+        differs = differing_numbers(study, other)
         if differs is not None:
             found.append(Relative(record, other, asked_by(other), differs))
     return tuple(found)
 
 
-def _differs(study: Study, other: Study) -> dict[str, float] | None:
+def what_differs(studies: Sequence[Study]) -> tuple[str, ...]:
+    """The few numbers of the machines in which studies differ, by path; () where they are no relatives."""
+    differing = [differing_numbers(studies[0], other) for other in studies[1:]]
+    paths = tuple(dict.fromkeys(path for found in differing for path in found or ()))
+    free = {path for study in studies for path in (*study.axis_paths, *study.derive)}
+    if None in differing or len(paths) > _MOST or not free.isdisjoint(paths):
+        return ()
+    return paths
+
+
+def differing_numbers(study: Study, other: Study) -> dict[str, float] | None:
     """The numbers of another machine that differ from this one's; None where it is no relative.
 
     What varies in either study has no number of its own there, and what is derived follows from the others.

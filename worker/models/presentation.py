@@ -42,6 +42,8 @@ class Reference:
 #: How an answer is read off a curve of a result: its value where x is 0, its largest or smallest value with the x of
 #: it, the x from which on it is 0, or its value at the working point.
 AnswerKind = Literal["at_zero", "largest", "smallest", "until_zero", "here"]
+#: Which of two values of an answer is the better one; "" where that depends on the machine's purpose.
+Better = Literal["larger", "smaller", ""]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +57,7 @@ class Answer:
     result : the result that it is read from
     kind : how it is read
     along : path of the axis along which it has a meaning; "" for any
+    better : whether a larger or a smaller value is the better one
     """
 
     name: str
@@ -62,6 +65,7 @@ class Answer:
     result: str
     kind: AnswerKind
     along: str = ""
+    better: Better = ""
 
 
 @dataclass(frozen=True, slots=True)

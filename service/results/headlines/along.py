@@ -153,7 +153,7 @@ def along_headline(
     place = curve_place(study, found, name)
     curve = found.drawn.curves[place]
     spot = place_on(curve, judged_by(study, curve.y), found.point, asked=asked)
-    of = _curve_of(study, found.curves[place]) if len(found.curves) > 1 else NOTHING
+    of = curve_words(study, found.curves[place].line.by) if len(found.curves) > 1 else NOTHING
     if spot is None:
         return Headline(of=of)
     own = Along(study, {info.name: info for info in infos}, curve, found.query.x, *spot)
@@ -170,7 +170,19 @@ def along_headline(
         trace=trace_of(curve.line.x, y, spot[1][0]),
         gap=gap,
         case=int(curve.line.cases[spot[1][0]]),
+        at=(found.query.x, spot[0]),
+        judged=_judged(own),
     )
+
+
+def _judged(own: Along) -> KeyNumber | None:
+    """What the case at the place is judged by; None between two cases, or without a result that counts."""
+    place, name = own.places[0], own.first.name
+    value = own.value(place, name)
+    if len(own.places) > 1 or not np.isfinite(value):
+        return None
+    case, where = int(own.curve.line.cases[place]), Phrase("at {place}", place=own.at(place))
+    return KeyNumber(name, value, own.first.unit, digits(value, _width(own, place, name)), where=where, case=case)
 
 
 def curve_place(study: Study, found: StudyAnswers, name: str) -> int:
@@ -179,15 +191,15 @@ def curve_place(study: Study, found: StudyAnswers, name: str) -> int:
     return usual_curve(study, found) if named is None else named
 
 
-def _curve_of(study: Study, one: CurveAnswers) -> Phrase:
-    """What tells a curve apart, with its names."""
+def curve_words(study: Study, by: Mapping[str, float]) -> Phrase:
+    """What tells a curve apart, with its names: ``vertical amplitude 2 mm``."""
     return joined(
         ", ",
         (
             term(direction(value))
             if path == SWEEP
             else joined(" ", (Name(path, within=True), Amount(value, unit_of(study, path), OF_PLACES)))
-            for path, value in one.line.by.items()
+            for path, value in by.items()
         ),
     )
 
@@ -284,7 +296,9 @@ def _number(found: Found, x_unit: str, own: Along | None) -> KeyNumber:
         return _stall(found)
     value = None if found.value is None else found.value
     unit, count = found.info.unit, digits(value or 0.0, found.half_width)
-    made = KeyNumber(found.answer.title, value, unit, count, where=NOTHING, note=_doubt(found), case=found.case)
+    made = KeyNumber(
+        found.answer.title, value, unit, count, note=_doubt(found), case=found.case, better=found.answer.better
+    )
     if value is None:
         return made
     made = replace(made, where=_where(found, x_unit))
@@ -352,4 +366,4 @@ def _plain(item: Found) -> KeyNumber:
     value = item.value or 0.0
     note = note_of(answer_facts(item), "1") if item.flags or item.regime else NOTHING
     unit, count = item.info.unit, digits(value, item.half_width)
-    return KeyNumber(item.answer.title, value, unit, count, note=note, case=item.case)
+    return KeyNumber(item.answer.title, value, unit, count, note=note, case=item.case, better=item.answer.better)

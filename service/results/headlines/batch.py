@@ -77,6 +77,7 @@ def batch_headline(
         trace=trace_of(line.line.x, line.spreads[name].nominal, place) if found.places.x else _spread(line, name),
         gap=gap,
         case=int(line.line.cases[place]),
+        at=None if found.places.x is None else (found.places.x, float(line.line.x[place])),
     )
 
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from sprag.service.reading.reader import Reading
     from sprag.worker.models import ResultInfo
+    from sprag.worker.models.presentation import Better
 
 #: Key numbers at most.
 MOST: Final = 4
@@ -47,6 +48,7 @@ class KeyNumber:
     where : the place where it holds, for people; "" for none
     note : what else should be known: its reserve, its value before
     case : the case that it was read from
+    better : which of two values is the better one, "larger" or "smaller"; "" where nothing says so
     """
 
     label: str
@@ -59,6 +61,7 @@ class KeyNumber:
     where: Phrase = NOTHING
     note: Phrase = NOTHING
     case: int | None = None
+    better: Better = ""
 
     def title(self, reading: Reading) -> str:
         """Its label for a reader."""
@@ -128,6 +131,8 @@ class Headline:
     trace : a line for a thumbnail; None where there is none
     gap : where the sentence is about a place without a case
     case : the case that the sentence is about
+    at : path and value (SI) of the place that the sentence is about; None where there is no such axis
+    judged : what a case is judged by, at that place; None where that is one of the ``numbers`` or there is none
     """
 
     sentence: tuple[Phrase, ...] = ()
@@ -138,6 +143,8 @@ class Headline:
     trace: Trace | None = None
     gap: Gap | None = None
     case: int | None = None
+    at: tuple[str, float] | None = None
+    judged: KeyNumber | None = None
 
     def said(self, reading: Reading) -> str:
         """Its sentences for a reader."""

@@ -23,6 +23,7 @@ from sprag.service.results.headlines.headline import (
 
 if TYPE_CHECKING:
     from sprag.service.results.fronts import Designs
+    from sprag.worker.models.presentation import Better
     from sprag.worker.planning.goals import Limit
 
 #: Relative change of the best value that counts as an improvement.
@@ -84,7 +85,8 @@ def _goal(found: Designs, best: int, place: int) -> KeyNumber:
     info, value = found.infos[name], float(found.front.goals[best, place])
     known = value if np.isfinite(value) else None
     unit, case = info.unit, int(found.front.cases[best, 0])
-    return KeyNumber(name, known, unit, digits(value), where=_points(found), case=case)
+    better: Better = "larger" if found.plan.best[place].max else "smaller"
+    return KeyNumber(name, known, unit, digits(value), where=_points(found), case=case, better=better)
 
 
 def _points(found: Designs) -> Phrase:

@@ -66,7 +66,9 @@ def test_the_page_lists_the_inputs_that_differ(service: Service, three: list[str
     assert "axes." not in table
     assert "Excitation frequency" not in table
     assert "base.shaft" not in table
-    assert "<th>first</th><th>second &amp; best</th><th>third</th>" in table
+    heads = re.findall(r'<a href="/studies/(\w+)">(.*?)</a><small>(.*?)</small>', table)
+    named = [("mass 0.5 kg", "first"), ("mass 0.6 kg", "second &amp; best"), ("mass 0.7 kg", "third")]
+    assert heads == [(study, *names) for study, names in zip(three, named, strict=True)]
     same = service.http.get("/compare", params={"study": [three[0], submit(service, "x", [0.1, 0.2, 0.4])]}).text
     assert "The inputs of these studies are the same." in same
 
@@ -138,7 +140,7 @@ def test_studies_without_a_common_axis_are_compared_by_their_inputs(service: Ser
     assert "no varying parameter in common" in page.text
     page = service.http.get("/compare", params={"study": [three[0], other], "language": "uk"})
     assert "не мають спільного змінного параметра" in page.text
-    for part in ("figure", "curves.csv"):
+    for part in ("picture.svg", "curves.csv"):
         (fault,) = service.http.get(f"/compare/{part}", params={"study": [three[0], other]}).json()["errors"]
         assert fault["code"] == "nothing-in-common"
     page = service.http.get("/compare", params={"study": [three[0], other]})
@@ -187,13 +189,99 @@ def test_differences_are_those_of_numpy_at_known_and_interpolated_places(service
 def test_pages_figures_and_pictures_show_differences(service: Service, three: list[str]) -> None:
     query = {"study": three, "x": X, "y": Y, "less": three[0]}
     text = service.http.get("/compare", params=query).text
-    assert "Differences from first, whose curves are interpolated" in text
-    assert f'<option value="{three[0]}" selected>differences from first' in text
-    (panel,) = seen(service.http.get("/compare/figure", params=query).text).panels
-    assert {curve.name for curve in panel.curves} == {"second & best − first", "third − first"}
+    assert "Differences from mass 0.5 kg, whose curves are interpolated" in text
+    assert f'<option value="{three[0]}" selected>differences from mass 0.5 kg' in text
+    (panel,) = seen(service.http.get("/compare", params=query).text).panels
+    assert {curve.name for curve in panel.curves} == {"0.6 kg − 0.5 kg", "0.7 kg − 0.5 kg"}
     for form, start in (("svg", b"<?xml"), ("png", b"\x89PNG"), ("pdf", b"%PDF")):
         answer = service.http.get(f"/compare/picture.{form}", params=query)
         assert (answer.status_code, answer.content[: len(start)]) == (200, start), form
+
+
+def numbers_of(text: str) -> dict[str, list[str]]:
+    """The cells of the table of numbers by the titles of its rows, without markup."""
+    table = text[text.index('id="numbers"') :].partition("</table>")[0]
+    rows = re.findall(r"<tr><th scope=\"row\">(.*?)</th>(.*?)</tr>", table, re.DOTALL)
+    plain = lambda cell: html.unescape(re.sub(r"<[^>]+>", "|", cell)).strip("|")  # noqa: E731
+    return {plain(title): [plain(cell) for cell in re.findall("<td.*?>(.*?)</td>", cells)] for title, cells in rows}
+
+
+def test_the_answer_comes_first(service: Service, three: list[str]) -> None:
+    text = service.http.get("/compare", params={"study": three, "units": "si"}).text
+    said = re.search(r'<p class="say[^>]*>(.*?)</p>', text)
+    assert said is not None
+    masses = ("0.5 kg", "0.6 kg", "0.7 kg")
+    speeds = {mass: curve(service, study, "22 Hz")[1][0] for mass, study in zip(masses, three, strict=True)}
+    largest, smallest = (
+        ", ".join(f"“mass {mass}”" for mass, speed in speeds.items() if speed == end)
+        for end in (max(speeds.values()), min(speeds.values()))
+    )
+    assert said[1].startswith("At 0.1 N·m the mean shaft speed is largest, ")
+    assert said[1].index(f"with {largest}, and smallest, ") < said[1].index(f"with {smallest}.")
+    assert text.index('id="say"') < text.index('id="numbers"') < text.index('id="chart"') < text.index('aria-label="What is drawn"')
+    rows = numbers_of(text)
+    assert [float(cell.split()[0]) for cell in rows["Mean shaft speed|at 0.1 N·m"]] == [
+        pytest.approx(value, rel=6e-3) for value in speeds.values()
+    ]
+    # The model says of power and efficiency what is better, of speeds it does not.
+    best = {title: [cell.count("best") for cell in cells] for title, cells in rows.items()}
+    power = next(title for title in rows if title.startswith("Largest useful power"))
+    assert 0 < sum(best[power]) < 3
+    assert not any(sum(cells) for title, cells in best.items() if "speed" in title)
+    ukrainian = service.http.get("/compare", params={"study": three, "language": "uk"}).text
+    assert "найбільше значення" in ukrainian
+
+
+def test_a_chart_has_five_curves_and_says_what_it_leaves_out(service: Service) -> None:
+    masses = [f"0.{mass} kg" for mass in range(3, 9)]
+    six = [submit(service, f"mass {mass}", [0.1, 0.2], mass) for mass in masses]
+    query: dict[str, Any] = {"study": six, "x": X, "units": "si"}
+
+    def drawn(**further: Any) -> tuple[list[str], str]:
+        text = service.http.get("/compare", params={**query, **further}).text
+        picture = seen(service.http.get("/compare/picture.svg", params={**query, **further}).text)
+        names = [curve.name for curve in seen(text).panels[0].curves]
+        assert [curve.name for curve in picture.panels[0].curves] == names
+        return names, text
+
+    names, text = drawn()
+    assert names == masses[:5]
+    assert "A chart has at most 5 curves. Without one here: “0.8 kg”. Choose others under “Other curves”." in text
+    names, text = drawn(show=six[2:])
+    assert names == masses[2:]
+    assert "at most 5 curves." not in text
+    assert f'name="show" value="{six[5]}" checked' in text
+    assert f'name="show" value="{six[0]}" checked' not in text
+    family = {"by": "excitation.frequency", "show": six[:4]}
+    names, text = drawn(**family)
+    assert names == ["20"] * 4
+    assert "Without one here: excitation frequency 22 Hz." in text
+    names, _ = drawn(**family, of="excitation.frequency=22 Hz")
+    assert names == ["22"] * 4
+    assert len(rows(service, six)) == 12
+
+
+def test_studies_of_different_models_or_kinds_are_told_apart(service: Service, three: list[str]) -> None:
+    file, text = preset_text("press")
+    press = service.submit(load_spec(text, file.rpartition(".")[2]))
+    page = service.http.get("/compare", params={"study": [three[0], press]})
+    assert page.status_code == 200
+    assert "These studies are of different models (Vibration drive, Machine shaft)" in page.text
+    assert 'id="numbers"' not in page.text
+    assert 'role="alert"' not in page.text
+    refused = service.http.get("/compare/curves.csv", params={"study": [three[0], press]})
+    assert refused.status_code == 422
+    assert "of different models" in refused.text
+    batch = copy.deepcopy(SPEC)
+    batch |= {"axes": [{"path": X, "values": [0.1, 0.2]}], "drives": 4,
+              "tolerances": [{"path": "pendulums.0.mass", "plus_minus": "5 %"}]}  # fmt: skip
+    batched = service.submit({**batch, "name": "batch"})
+    service.fill(batched)
+    text = service.http.get("/compare", params={"study": [three[0], batched]}).text
+    assert "These studies ask different things" in text
+    assert "Half of the drives above" in numbers_of(text)
+    assert "<td>0.5 kg</td><td>0.5 kg ± 5 %, normal</td>" in text
+    assert "<td>Mean shaft speed along load torque</td><td>What tolerances do</td>" in text
 
 
 def test_what_cannot_be_compared_is_refused(service: Service, three: list[str]) -> None:
@@ -207,7 +295,7 @@ def test_what_cannot_be_compared_is_refused(service: Service, three: list[str]) 
     assert page.status_code == 422
     assert "at most 10" in page.text
     assert service.http.get("/compare/picture.gif", params={"study": three}).status_code == 422
-    for part in ("figure", "curves.csv", "picture.svg"):
+    for part in ("curves.csv", "picture.svg"):
         (fault,) = service.http.get(f"/compare/{part}").json()["errors"]
         assert (fault["parameter"], fault["code"], fault["allowed"]) == ("study", "required", "1 to 10 ids of studies")
     assert service.http.get("/compare/curves.csv", params={"study": [*three, "st_nothing"]}).status_code == 404

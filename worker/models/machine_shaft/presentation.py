@@ -88,11 +88,11 @@ PRESENTATION: Final = Presentation(
     main=("irregularity", "omega.max", "omega.min", "energy.fluctuation", "drive_torque.mean", "required_inertia"),
     below=("required_inertia", "energy.fluctuation"),
     answers=(
-        Answer("irregularity", "Irregularity", "irregularity", "here"),
+        Answer("irregularity", "Irregularity", "irregularity", "here", better="smaller"),
         Answer("required_inertia", "Required inertia", "required_inertia", "here"),
         Answer("energy_fluctuation", "Energy fluctuation", "energy.fluctuation", "here"),
         Answer("mean_energy", "Mean kinetic energy", "energy.mean", "here"),
-        Answer("least_irregularity", "Least irregularity", "irregularity", "smallest"),
+        Answer("least_irregularity", "Least irregularity", "irregularity", "smallest", better="smaller"),
     ),
     wanted={"irregularity": "wanted_irregularity"},
     clauses=Clauses(

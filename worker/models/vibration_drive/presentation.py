@@ -59,8 +59,8 @@ PRESENTATION: Final = Presentation(
     below=("power.useful.mean", "efficiency"),
     answers=(
         Answer("no_load_speed", "No-load speed", "shaft.speed.mean", "at_zero", along="shaft.load"),
-        Answer("largest_power", "Largest useful power", "power.useful.mean", "largest"),
-        Answer("best_efficiency", "Best efficiency", "efficiency", "largest"),
+        Answer("largest_power", "Largest useful power", "power.useful.mean", "largest", better="larger"),
+        Answer("best_efficiency", "Best efficiency", "efficiency", "largest", better="larger"),
         Answer("stall_torque", "Stall torque", "shaft.speed.mean", "until_zero", along="shaft.load"),
     ),
     clauses=Clauses(

@@ -180,9 +180,13 @@ def brief(headline: Headline | None, reading: Reading) -> str:
 
 def short_titles(numbers: Sequence[KeyNumber], reading: Reading) -> list[str]:
     """The titles of numbers, without the part of the machine where they differ without it."""
-    titles = [one.title(reading) for one in numbers]
+    return short_captions([one.title(reading) for one in numbers])
+
+
+def short_captions(titles: Sequence[str]) -> list[str]:
+    """Captions without the part of the machine where they differ without it."""
     short = [title.partition(",")[0] for title in titles]
-    return short if len(set(short)) == len(short) else titles
+    return short if len(set(short)) == len(short) else list(titles)
 
 
 def _variants(

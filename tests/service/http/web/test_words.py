@@ -56,7 +56,7 @@ def test_a_comparison_is_read_as_its_first_study(service: Service, study_id: str
     seen = _HIDDEN.sub(" ", service.http.get(f"/compare?{query}").text)
     assert "Load torque (N·mm)" in seen
     assert sorted(name for name in names if name in seen) == []
-    figure = picture_of(service.http.get(f"/compare/figure?{query}").text)
+    figure = picture_of(service.http.get(f"/compare?{query}").text)
     assert figure.has("Load torque (N·mm)")
     most = 1e3 * max(service.store.studies.study(study_id).columns(range(9))["shaft.load"])
     assert figure.panels[0].curves[0].values[:, 0].max() == pytest.approx(most, rel=1e-3)
