@@ -20,7 +20,7 @@ from sprag.service.http.drawing import Drawing, attached, picture, tag_of, unles
 from sprag.service.http.reading import FileChoice, address_pairs
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
-from sprag.service.http.web.comparison.answer import Answer, answer_of, charted
+from sprag.service.http.web.comparison.answer import Answer, answer_of, charted, curves_each
 from sprag.service.http.web.comparison.chosen import (
     Comparison,
     chosen_studies,
@@ -183,7 +183,7 @@ def _fixed(chosen: Comparison, reading: Reading) -> list[dict[str, Any]]:
 
 
 def _values(chosen: Comparison) -> list[dict[str, Any]]:
-    """For each parameter that tells curves of a study apart, the first study's values and whether they are chosen."""
+    """For each parameter that tells curves of a study apart, the first study's values and whether they have a curve."""
     found = []
     study = chosen.studies[0]
     for path in chosen.by:
@@ -191,7 +191,9 @@ def _values(chosen: Comparison) -> list[dict[str, Any]]:
         texts = [text for own, _, text in (item.partition("=") for item in chosen.of) if own == path]
         asked = {study.axis_with(path).index_of(value_of(path, text, unit, "of")) for text in texts}
         axis = study.axis_with(path)
-        values = [(value, axis.index_of(value) in asked) for value in sorted(set(axis.values))[:_VALUES]]
+        every = sorted(set(axis.values))
+        asked = asked or {axis.index_of(value) for value in every[: curves_each(chosen)]}
+        values = [(value, axis.index_of(value) in asked) for value in every[:_VALUES]]
         found.append({"path": path, "unit": unit, "values": values})
     return found
 

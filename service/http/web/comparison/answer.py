@@ -303,6 +303,13 @@ def _title(chosen: Comparison, reading: Reading) -> str:
     )  # fmt: skip
 
 
+def curves_each(chosen: Comparison) -> int:
+    """Curves of each study in a chart at most."""
+    ids = [record.id for record in chosen.records if record.id != chosen.less]
+    shown = [study_id for study_id in ids if study_id in chosen.shown] or ids
+    return max(MOST_DRAWN // len(shown), 1)
+
+
 def charted(chosen: Comparison, curves: Sequence[tuple[str, Curves]]) -> tuple[list[tuple[str, Curves]], list[Phrase]]:
     """The curves of a chart, at most `MOST_DRAWN`, and what has none there: of the shown studies, and of their values.
 
@@ -311,7 +318,7 @@ def charted(chosen: Comparison, curves: Sequence[tuple[str, Curves]]) -> tuple[l
     ids = [record.id for record in chosen.records if record.id != chosen.less]
     wanted = [pair for study_id, pair in zip(ids, curves, strict=True) if not chosen.shown or study_id in chosen.shown]
     wanted = wanted or list(curves)
-    kept, each = wanted[:MOST_DRAWN], max(MOST_DRAWN // len(wanted[:MOST_DRAWN]), 1)
+    kept, each = wanted[:MOST_DRAWN], curves_each(chosen)
     left = [Phrase("“{name}”", name=name) for name, _ in wanted[MOST_DRAWN:]]
     values: dict[str, Phrase] = {}
     found = []

@@ -55,6 +55,7 @@ def test_studies_are_named_found_deleted_and_restored(visitor: Visitor, office: 
     page.get_by_role("button", name="Compare").click()
     page.wait_for_url("**/compare?*")
     expect(page.get_by_text("The inputs of these studies are the same.")).to_be_visible()
+    page.get_by_text("Other curves").click()
     page.locator("select[name=less]").select_option(label="differences from order: beta")
     page.get_by_role("button", name="Draw").click()
     expect(page.locator("figcaption")).to_contain_text("Differences from order: beta")

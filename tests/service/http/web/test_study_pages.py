@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from playwright.sync_api import expect
 
-from tests.service.figures.seen import Curve
-from tests.service.http.web.fields import drawn
+from tests.service.figures.seen import Curve, seen
 
 if TYPE_CHECKING:
     from tests.service.http.web.conftest import Office, Visitor
@@ -151,7 +150,8 @@ def test_two_studies_are_compared(visitor: Visitor, office: Office, example: str
         page.locator(f'input[value="{study_id}"]').check()
     page.get_by_role("button", name="Compare").click()
     page.wait_for_url("**/compare?*")
-    lines = drawn(page)
+    expect(page.locator("#say")).to_be_visible()
+    lines = [line for panel in seen(page.locator("#chart").inner_html()).panels for line in panel.curves]
     assert {line.name for line in lines} == {"Feeder motor: speed against load", "Another load"}
     told = office.get(f"/studies/{other}/curves", x="shaft.load", y="shaft.speed.mean")
     wanted = near(told["curves"][0]["y"]["shaft.speed.mean"])
