@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
@@ -30,7 +31,7 @@ from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.regimes import counted, left_out
 from sprag.service.results.rounds import sentence
 from sprag.service.results.shown_inputs import choice_name, in_words, run_settings
-from sprag.service.results.varied import formula_in_words, formula_text, in_captions, values_text
+from sprag.service.results.varied import formula_in_words, formula_text, in_captions, tolerances_of, values_text
 from sprag.service.views.study_questions import CHAPTERS
 from sprag.worker import models
 from sprag.worker.planning.calibrate.plan import CALIBRATE
@@ -229,9 +230,19 @@ def _value(report: Report, item: Input) -> str:
 
 
 def _given(report: Report) -> Iterator[Block]:
-    rows = tuple((_place(report, path), _text(report, path, text)) for path, text in report.given.items())
+    rows = [
+        (_place(report, path), _text(report, path, text))
+        for path, text in report.given.items()
+        if not path.startswith("tolerances.")
+    ]
+    for paths, said in tolerances_of(report.study):
+        rows.append((_("Tolerance: {name}", name=lower_first(_tied(report, paths))), report.reading.say(said)))
     if rows:
-        yield Table((_("Field"), _("As given")), rows)
+        yield Table((_("Field"), _("As given")), tuple(rows))
+
+
+def _tied(report: Report, paths: tuple[str, ...]) -> str:
+    return report.reading.caption(" = ".join(paths))
 
 
 def _place(report: Report, path: str) -> str:
@@ -241,10 +252,22 @@ def _place(report: Report, path: str) -> str:
     return report.reading.place(Place(pointer, path.removeprefix("base.") if report.reading.names == CODES else ""))
 
 
+def _listed(text: str) -> str:
+    """A list as it is typed, its items in their order; one that was shortened stays as it is."""
+    try:
+        items = json.loads(text)
+    except ValueError:
+        return text
+    rows = (item if isinstance(item, list) else [item] for item in items)
+    return "; ".join(", ".join(one if isinstance(one, str) else number(one, 12) for one in row) for row in rows)
+
+
 def _text(report: Report, path: str, text: str) -> str:
     """What was given: a choice in words, a formula with names of quantities."""
     if path.startswith(_DERIVED):
         return formula_in_words(text, report.reading)
+    if text.startswith("["):
+        text = _listed(text)
     choice = re.fullmatch("[a-z]+(_[a-z]+)*", text)
     return gettext(words(text)) if choice else in_captions(text, report.names, report.reading)
 

@@ -10,7 +10,7 @@ from sprag.service.reading.catalogue import axes_json
 from sprag.service.reading.reader import Phrase, joined, plural
 from sprag.service.report.blocks import Section, Table, Text
 from sprag.service.results.asked import goals_of, limits_of
-from sprag.service.results.varied import ends, formula_text, varied, with_tolerance
+from sprag.service.results.varied import ends, formula_text, varied, with_distribution, with_tolerance
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -69,7 +69,7 @@ def _varied(report: Report) -> Iterator[tuple[Words, ...]]:
             if said:
                 yield title, joined("; ", said)
     for paths, value in varied(report.study):
-        yield report.reading.caption(" = ".join(paths)), with_tolerance(report.study, paths[0], value)
+        yield report.reading.caption(" = ".join(paths)), with_distribution(report.study, paths[0], value)
 
 
 def _given(report: Report) -> Iterator[tuple[Words, ...]]:
@@ -88,4 +88,4 @@ def _value(report: Report, item: Input) -> Words:
     if item.origin == "derived":
         return Phrase("= {formula}", formula=formula_text(item, report.reading))
     value = Amount(item.value, item.unit, _DIGITS) if isinstance(item.value, float | int) else str(item.value)
-    return with_tolerance(report.study, item.path, value)
+    return with_distribution(report.study, item.path, value)

@@ -16,6 +16,7 @@ from sprag.service.faults import SelectionError
 from sprag.service.figures.clutch import clutch_figure
 from sprag.service.figures.pictures import MOST_RESULTS, require_drawable
 from sprag.service.languages import _
+from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.directions import case_values
 from sprag.service.reading.quantities import TYPED
 from sprag.service.reading.reader import Choice, Reading, model_title, reading_for
@@ -119,8 +120,8 @@ class Report:
 
         Raises SelectionError for chosen curves and for a working point that cannot be shown.
         """
-        point = self.question.point
         query = answers_query(self.study, self.infos, self.chosen)
+        point = self.question.point or self._place_of_batch(query)
         if query is None and self.study.cases > 1 and not point:
             return None
         try:
@@ -130,10 +131,18 @@ class Report:
             if found.drawn is not None:
                 require_drawable([found.drawn])
         except SelectionError:
-            if self.chosen is not None or point:
+            if self.chosen is not None or self.question.point:
                 raise
             return None
         return found
+
+    def _place_of_batch(self, query: CurveQuery | None) -> str | None:
+        """The value of the axis at which the answer of a batch holds, which has a case of every drive."""
+        batch = self.study.spread is not None and self.study.plan is None and self.chosen is None
+        if not batch or query is None or self.headline.case is None:
+            return None
+        unit = unit_of(self.study, query.x)
+        return f"{self.study.case_parameters(self.headline.case)[query.x]!r} {'' if unit == '1' else unit}"
 
     @cached_property
     def curve(self) -> int | None:

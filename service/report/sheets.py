@@ -19,7 +19,7 @@ from sprag.service.figures.front import NUMBER, front_figure, quantities
 from sprag.service.figures.orders import motion_name, motion_text
 from sprag.service.languages import _
 from sprag.service.reading.part_names import upper_first
-from sprag.service.reading.reader import joined, plural
+from sprag.service.reading.reader import Phrase, joined, plural
 from sprag.service.report.blocks import Block, Section, Table, Text
 from sprag.service.report.conditions import conditions
 from sprag.service.report.content import varies
@@ -147,13 +147,14 @@ def _along(report: Report) -> Iterator[Section]:
             cells.append(_motion(curve, index))
         rows.append(tuple(cells))
     line = found.curves[place].line
-    held = joined(
-        "; ", (held_text(report.study, path, value) for path, value in {**line.by, **line.at}.items() if path != DRIVE)
-    )
+    fixed = {**line.by, **line.at}
+    nominal = [Phrase("nominal drive")] if DRIVE in fixed else []
+    others = (held_text(report.study, path, value) for path, value in fixed.items() if path != DRIVE)
+    held = joined("; ", (*nominal, *others))
     title = _("Answers along the axis: {axis}", axis=read.within(found.query.x))
     meant = next((row for row, index in enumerate(shown) if curve.line.x[index] == found.point), None)
     table = Table(tuple(heads), tuple(rows), tuple(range(1 + len(names))), chosen=meant)
-    yield Section(title, (*([Text(held)] if held else []), table), 2)
+    yield Section(title, (*([Text(upper_first(read.say(held)))] if held else []), table), 2)
     yield Section("", tuple(_main(report, _PANELS, _PANELS + 1)), 2)
 
 

@@ -12,12 +12,12 @@ from sprag.service.languages import N_
 from sprag.service.languages import gettext as _
 from sprag.service.reading.catalogue import shown_values, unit_of
 from sprag.service.reading.part_names import part_name, upper_first
-from sprag.service.reading.reader import Phrase, joined, model_title, plural, shown, term
+from sprag.service.reading.reader import Phrase, joined, model_title, plural, term
 from sprag.service.reading.wording import number, typed_text, unit_text
 from sprag.service.results.asked import goals_of, limits_of
 from sprag.service.results.calibration import plan_of
 from sprag.service.results.shown_inputs import choice_name, in_words, run_settings
-from sprag.service.results.varied import formula_text, in_captions, names_in_files, varied, with_tolerance
+from sprag.service.results.varied import formula_text, in_captions, names_in_files, varied, with_distribution
 from sprag.service.spec.described import Described
 from sprag.service.spec.kinds.calibrate import CALIBRATE as CALIBRATION
 from sprag.service.spec.kinds.goal import GOAL as SEARCH
@@ -159,9 +159,7 @@ def _toleranced(one: ReadStudy, path: str, cell: _Cell, text: Text) -> _Cell:
     about = next((own.about for own in tolerances if path in own.paths), None)
     if about is None:
         return cell
-    said = _said(with_tolerance(one.study, path, text), one.reading)
-    if (name := about.get("distribution")) is not None:
-        said = f"{said}, {shown(term(str(name)))}"
+    said = _said(with_distribution(one.study, path, text), one.reading)
     return replace(cell, value=(cell.value, repr(about)), text=said, full="")
 
 

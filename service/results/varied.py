@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from sprag.sentences import Amount
 from sprag.service.languages import _
 from sprag.service.reading.catalogue import axes_json, shown_values, unit_of
-from sprag.service.reading.reader import CODES, Phrase, joined, plural
+from sprag.service.reading.reader import CODES, Phrase, joined, plural, term
 from sprag.service.reading.wording import number, typed_text, unit_text
 from sprag.service.results.calibration import plan_of
 from sprag.service.results.fronts import goal_of
@@ -19,7 +19,7 @@ from sprag.worker.planning.calibrate.plan import CALIBRATE
 from sprag.worker.planning.goals.plan import GOAL
 
 if TYPE_CHECKING:
-    from collections.abc import Container, Iterable, Iterator, Sequence
+    from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 
     from sprag.service.exports.inputs import Input
     from sprag.service.reading.reader import Reading
@@ -114,6 +114,29 @@ def with_tolerance(study: Study, path: str, value: Text) -> Text:
         if path in one.paths and "plus_minus" in one.about:
             return Phrase("{value} ± {tolerance}", value=value, tolerance=typed_text(str(one.about["plus_minus"])))
     return value
+
+
+def with_distribution(study: Study, path: str, value: Text) -> Text:
+    """The same with the distribution of the parameter: ``0.2 mm ± 60 %, normal``."""
+    for one in () if study.spread is None else study.spread.tolerances:
+        if path in one.paths:
+            return joined(", ", (with_tolerance(study, path, value), *_distribution(one.about)))
+    return value
+
+
+def tolerances_of(study: Study) -> Iterator[tuple[tuple[str, ...], Phrase]]:
+    """The parameters of each tolerance, and how they differ from drive to drive: ``± 60 %, normal``."""
+    for one in () if study.spread is None else study.spread.tolerances:
+        width = one.about.get("plus_minus")
+        parts = [] if width is None else [Phrase("± {tolerance}", tolerance=typed_text(str(width)))]
+        yield one.paths, joined(", ", (*parts, *_distribution(one.about)))
+
+
+def _distribution(about: Mapping[str, Any]) -> Iterator[Phrase]:
+    if "values" in about:
+        yield plural("{count} measured value", "{count} measured values", int(about["values"]))
+    elif "distribution" in about:
+        yield term(str(about["distribution"]))
 
 
 def names_in_files(names: Iterable[str]) -> frozenset[str]:

@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from sprag.service.results.curves import CurveQuery, Fetch
+    from sprag.service.results.refined import Line
+    from sprag.service.results.tolerances.batch import Places
     from sprag.service.results.tolerances.ribbons import Ribbon, RibbonLine
     from sprag.service.results.tolerances.yields import Yield, YieldLine
     from sprag.worker.models import ResultInfo
@@ -126,12 +128,7 @@ def _sentence(found: Ribbon, line: RibbonLine, name: str, place: int) -> Phrase:
 def _numbers(found: Ribbon, line: RibbonLine, name: str, place: int, reached: Yield) -> tuple[KeyNumber, ...]:
     info, quantiles = found.results[0], line.spreads[name].quantiles
     low, middle, high = (float(value) for value in quantiles.values[:, place])
-    unit, own = info.unit, found.places.x
-    where = (
-        NOTHING
-        if own is None
-        else Phrase("at {place}", place=Amount(line.line.x[place], found.places.units[own], OF_PLACES))
-    )
+    unit, where = info.unit, _where(found.places, line.line, place)
     half = _half_width(float(quantiles.low[_MIDDLE, place]), float(quantiles.high[_MIDDLE, place]))
     nominal = float(line.spreads[name].nominal[place])
     count = digits(high)
@@ -155,6 +152,13 @@ def with_yield(head: Headline, reached: Yield) -> Headline:
     return head
 
 
+def _where(places: Places, line: Line, place: int) -> Phrase:
+    """At which value of the axis of a batch; nothing for a single place."""
+    if places.x is None:
+        return NOTHING
+    return Phrase("at {place}", place=Amount(line.x[place], places.units[places.x], OF_PLACES))
+
+
 def _half_width(low: float, high: float) -> float | None:
     return 0.5 * (high - low) if np.isfinite(low + high) else None
 
@@ -165,7 +169,8 @@ def _yield(own: YieldLine, place: int, reached: Yield) -> list[KeyNumber]:
         return []
     share, low, high = (float(ends[place]) for ends in (own.each.value, own.each.low, own.each.high))
     count = digits(share, 0.5 * (high - low))
-    where = joined(", ", [one.text for one in reached.conditions])
+    at = _where(reached.places, own.line, place)
+    where = joined(", ", [*(one.text for one in reached.conditions), *([at] if at else [])])
     return [KeyNumber(_YIELD, share, models.SHARE, count, low, high, where=where)]
 
 

@@ -67,7 +67,7 @@ def worst_sentences(line: YieldLine) -> Iterator[str]:
 
 
 def _percent(share: float) -> str:
-    return decimal(f"{100.0 * share:.1f} %")
+    return decimal(f"{100.0 * share:.1f} %").replace("-", "\N{MINUS SIGN}")
 
 
 def causes_sentences(study: Study, causes: Causes, name: str) -> Iterator[str]:

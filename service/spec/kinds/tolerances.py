@@ -22,6 +22,7 @@ from sprag.service.spec.draws.distributions import Distribution
 from sprag.service.spec.draws.unit import correlated, unit_sample
 from sprag.service.spec.fields import expanded
 from sprag.service.spec.kinds.draft import Kind
+from sprag.service.spec.node import Node
 from sprag.worker.derived import blocks, involved
 from sprag.worker.limits import MAX_AXIS_VALUES, MAX_CASES, MAX_DRIVES, MAX_TOLERANCES
 from sprag.worker.models.parameters import in_range, parameter_of
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag.service.spec.kinds.draft import Draft, Finish
-    from sprag.service.spec.node import Node
     from sprag.service.spec.report import Report
     from sprag.worker.models import Parameter
     from sprag.worker.study import Study
@@ -272,6 +272,8 @@ def _mixed(node: Node, nominal: list[_Nominal]) -> bool:
 def _around(item: Node, kind: str, name: str, paths: tuple[str, ...], nominal: list[_Nominal]) -> list[_Drawn]:
     """A tolerance around the nominal values."""
     node = item["plus_minus"]
+    if isinstance(node.value, str) and node.value.strip().startswith("±"):  # as pages print it
+        node = Node(node.report, node.pointer, node.value.strip()[1:].lstrip())
     if _mixed(node, nominal):
         return []
     units = list(dict.fromkeys(one.parameter.unit for one in nominal))

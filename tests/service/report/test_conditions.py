@@ -8,12 +8,14 @@ import pytest
 
 from sprag.service import languages
 from sprag.service.reading.reader import Choice, Reading
-from sprag.service.report.blocks import Document, Table
+from sprag.service.report.blocks import Document, Table, Text
 from sprag.service.report.document import document_of
 from sprag.service.results.shown_inputs import inputs, varying
-from sprag.service.results.varied import listed
+from sprag.service.results.varied import listed, tolerances_of
 from sprag.service.views.library import Library
 from sprag.service.views.study_questions import ReportQuestion
+from tests.service.http.web.test_accessibility import preset
+from tests.service.report.test_two_pages import finished
 from tests.service.searching import search
 
 if TYPE_CHECKING:
@@ -96,3 +98,28 @@ def test_a_search_tells_what_it_was_asked_for_and_all_of_the_best_design(service
     assert found["Inertia of the driven side"] == "10; 20 kg·cm², searched"
     first = {str(row[0]) for block in told.sections[0].blocks if isinstance(block, Table) for row in block.rows}
     assert {"Efficiency", "Excitation frequency", "Horizontal amplitude", "Inertia of the driven side"} <= first
+
+
+def test_a_batch_is_answered_where_every_drive_has_a_case(service: Service) -> None:
+    """Neither of 0.05 and 0.15 N·m is the load of the base, 0.1 N·m; widths and the nominal drive are named."""
+    study_id = finished(service, "tolerances")
+    told = document(service, study_id, appendix=["answers", "given"])
+    found = rows(told)
+    assert not [row for row in found if "interpolated" in row[-1]]
+    (share,) = (row for row in found if row[0] == "Yield")
+    assert share[-1].endswith("of nominal, at 0.15 N·m")
+    given = {row[0]: row[1] for row in found}
+    assert given["Spring rate, pendulum 0"] == "9000 N/m"
+    assert given["Tolerance: spring rate, pendulum 0"] == "± 10 %, uniform"
+    assert given["Tolerance: horizontal amplitude = vertical amplitude"] == "± 5 %, normal"
+    assert given["Clutch, coefficients"] == "0; 200; 0; 20\u202f000"
+    assert ("Spring rate, pendulum 0", "9 N/mm ± 10 %, uniform") in found
+    (along,) = (section for section in told.sections if section.title.startswith("Answers along"))
+    assert [block.text for block in along.blocks if isinstance(block, Text)] == ["Nominal drive"]
+    assert "±</text>" not in service.http.get(f"/studies/{study_id}").text
+
+
+def test_a_tolerance_is_read_as_it_is_printed(service: Service) -> None:
+    spec = {**preset("tolerances"), "tolerances": [{"path": "shaft.inertia", "plus_minus": "± 5 %"}]}
+    study = service.store.studies.study(service.submit(spec))
+    assert [str(text) for _, text in tolerances_of(study)] == ["± 5 %, normal"]

@@ -10,12 +10,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 from markupsafe import Markup
 
+from sprag.sentences import Amount
 from sprag.service.exports.inputs import inputs
 from sprag.service.figures.drawing import svg
 from sprag.service.figures.drawings import drawings
 from sprag.service.languages import gettext
 from sprag.service.reading.catalogue import unit_of
+from sprag.service.reading.reader import joined
 from sprag.service.reading.wording import number, unit_text
+from sprag.service.results.varied import with_tolerance
 from sprag.worker import models
 
 if TYPE_CHECKING:
@@ -66,7 +69,7 @@ def _tied(study: Study, best: Mapping[str, float]) -> dict[str, float]:
 
 
 def _label(study: Study, reading: Reading, path: str, best: Mapping[str, float]) -> str:
-    """The value at a dimension: the ends of what varies, a sign at what has a tolerance."""
+    """The value at a dimension: the ends of what varies, the width of a tolerance."""
     si = unit_of(study, path)
     axis = study.axis_of(path)
     if axis is not None and not best and len(study.axes[axis]) > 1:
@@ -74,5 +77,4 @@ def _label(study: Study, reading: Reading, path: str, best: Mapping[str, float])
         low, high = (number(reading.value(float(end), si), _DIGITS) for end in (values.min(), values.max()))
         return f"{low}…{high} {unit_text(reading.unit(si))}".strip()
     value = float(study.axes[axis].array[0]) if axis is not None and not best else study.base[path]
-    drawn = study.spread is not None and path in study.spread.paths
-    return f"{reading.quantity(value, si, _DIGITS)}{' ±' if drawn else ''}"
+    return reading.say(joined("", [with_tolerance(study, path, Amount(value, si, _DIGITS))]))
