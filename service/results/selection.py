@@ -211,7 +211,8 @@ def value_of(path: str, text: str, unit: str, parameter: str = "at") -> float:
                 parameter, "unknown-value", "is not a direction", f"{path}={text}", allowed=allowed
             ) from error
         message = of_name(path, error.message)
-        raise refused(parameter, error.code, message, f"{path}={text}", unit=unit) from error
+        given = f"{path}={text}" if parameter == "at" else text
+        raise refused(parameter, error.code, message, given, unit=unit) from error
 
 
 def of_name(name: str, message: str) -> Sentence:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 from contextlib import suppress
 from contextvars import copy_context
+from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Final
 from urllib.parse import urlencode
 
@@ -26,10 +28,11 @@ from sprag.service.report import Office
 from sprag.service.report.document import LONGEST_TEXT
 from sprag.service.report.html import embedded
 from sprag.service.report.page import Shown, shown_document
+from sprag.service.views.library import reading_of
 from sprag.service.views.study_questions import ReportQuestion
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Callable
+    from collections.abc import AsyncIterator, Awaitable, Callable
 
     from sprag.service.faults import Fault
     from sprag.service.http.context import Context
@@ -56,9 +59,12 @@ async def document_page(*, context: Ctx, work: Attended, study_id: StudyId, ques
         return RedirectResponse(f"/studies/{study_id}/document{'?' if query else ''}{query}", status_code=303)
     shell = await in_thread(_shell, context, study_id)
     begin, end = shell.split(_HERE)
-    making = asyncio.ensure_future(
-        work.check(shown_document, context.library, study_id, current().choice, question, office)
-    )
+
+    def make(asked: ReportQuestion) -> Awaitable[Shown]:
+        return work.check(shown_document, context.library, study_id, current().choice, asked, office)
+
+    making = asyncio.ensure_future(make(question))
+    without_point = partial(make, replace(question, point=None)) if question.point else None
     here = copy_context()
 
     def render(shown: Shown | None, faults: tuple[Fault, ...]) -> str:
@@ -66,13 +72,13 @@ async def document_page(*, context: Ctx, work: Attended, study_id: StudyId, ques
 
     await asyncio.wait([making], timeout=_SOON)
     if making.done():
-        text, status = await _made(making, render)
+        text, status = await _made(making, without_point, render)
         return Response(begin + text + end, status_code=status, media_type="text/html")
 
     async def pieces() -> AsyncIterator[str]:
         try:
             yield begin + str(fragment("_making.html"))
-            text, _status = await _made(making, render)
+            text, _status = await _made(making, without_point, render)
             yield text + end
         finally:
             making.cancel()
@@ -98,14 +104,24 @@ def _kept(given: list[tuple[str, str]], today: str) -> list[tuple[str, str]]:
     ]
 
 
-async def _made(making: asyncio.Future[Shown], render: Render) -> tuple[str, int]:
-    """The rest of the page, and the status that it would have."""
+async def _made(
+    making: asyncio.Future[Shown], without_point: Callable[[], Awaitable[Shown]] | None, render: Render
+) -> tuple[str, int]:
+    """The rest of the page, and the status that it would have.
+
+    Where the working point is refused, the document ``without_point`` is shown, with what its author has written.
+    """
+    shown, faults = None, ()
     try:
-        return await in_thread(render, await making, ()), 200
+        shown = await making
     except FaultError as error:
         if not error.faults:
             raise
-        return await in_thread(render, None, tuple(error.faults)), 422
+        faults = tuple(error.faults)
+        if without_point is not None:
+            with suppress(FaultError):
+                shown = await without_point()
+    return await in_thread(render, shown, faults), 422 if faults else 200
 
 
 def _shell(context: Context, study_id: str) -> str:
@@ -129,6 +145,8 @@ def _document(
         study_id=study_id,
         shown=shown,
         faults=faults,
+        reading=reading_of(context.store, study_id, current().choice),
+        field_names={"point": _("Working point")},
         question=question,
         fields={
             _("Customer"): "customer",

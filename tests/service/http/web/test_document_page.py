@@ -49,12 +49,14 @@ def test_a_report_that_takes_long_is_announced_first(
     assert page.rstrip().endswith("</html>")
 
 
-def test_what_is_refused_is_said_and_the_form_stays(service: Service, address: str) -> None:
-    answer = service.http.get(address, params={"point": "much", "customer": "Acme"})
+def test_what_is_refused_is_said_and_the_document_stays(service: Service, address: str) -> None:
+    answer = service.http.get(address, params={"point": "much", "customer": "Acme", "text": "Beside the drawing."})
     assert answer.status_code == 422
     assert 'role="alert"' in answer.text
     assert re.search(r'name="point"[^>]* value="much"', answer.text)
-    assert "<article" not in answer.text
+    assert "shaft.load" not in answer.text
+    assert 'value="Acme"' in answer.text
+    assert "Beside the drawing.</textarea>" in answer.text
     assert service.http.get(address, params={"appendix": "everything"}).status_code == 422
 
 
