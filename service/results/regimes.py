@@ -150,4 +150,20 @@ def regimes_of(lists: Iterable[Sequence[str | None] | None]) -> list[str]:
 
 def counted(counts: Mapping[str, int]) -> Phrase:
     """The number of cases by regime, in words: ``486 periodic, 24 irregular``."""
-    return joined(", ", (Phrase("{count} {regime}", count=count, regime=term(name)) for name, count in counts.items()))
+    return joined(", ", (_counted(name, count) for name, count in counts.items()))
+
+
+def _counted(regime: str, count: int) -> Phrase:
+    """So many motions of a regime; words of other languages agree with the number."""
+    match regime:
+        case "periodic":
+            return plural("{count} periodic", "{count} periodic", count)
+        case "held":
+            return plural("{count} held", "{count} held", count)
+        case "coasting":
+            return plural("{count} coasting", "{count} coasting", count)
+        case "irregular":
+            return plural("{count} irregular", "{count} irregular", count)
+        case "unsettled":
+            return plural("{count} unsettled", "{count} unsettled", count)
+    return Phrase("{count} {regime}", count=count, regime=term(regime))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import re
 from typing import Any
 
 import numpy as np
@@ -61,6 +62,10 @@ def test_a_search_shows_its_best_design_with_what_it_was(service: Service) -> No
     told = {one.label: one.value for one in headline.dimensions}
     assert told == pytest.approx(designs[0]["variables"])
     assert reading.say(headline.dimensions[0].note) == "25 Hz before"
+    page = service.http.get(f"/studies/{study_id}").text
+    shown = reading_of(service.store, study_id, Choice("workshop"))
+    for one in headline.dimensions:  # the same digits beside the drawing
+        assert len(re.findall(rf">\D*(?<![\d.]){re.escape(one.number(shown))}(?![\d.])", page)) > 1, one
     (limit,) = headline.limits
     assert limit.label == "shaft.speed.mean"
     assert reading.say(limit.note) == "as required: 8 rad/s"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from fastapi import Header, Query, Request
 from starlette.responses import Response
 
+from sprag.sentences import Sentence
 from sprag.service import languages
 from sprag.service.http import streams
 from sprag.service.http.context import Context, Ctx
@@ -71,7 +72,7 @@ async def live(
 ) -> Response:
     """An event when the list has changed; its address has the parameters of the page that shows the list."""
     if name not in _LISTS:
-        raise ApiError("not-found", "Unknown list.")
+        raise ApiError("not-found", Sentence("Unknown list."))
 
     def look() -> Seen:
         listed_now = to_bytes(_LISTS[name](context, request.query_params))

@@ -12,6 +12,7 @@ from fastapi import Query, Request
 from starlette.datastructures import QueryParams
 from starlette.responses import RedirectResponse, Response
 
+from sprag.sentences import Sentence
 from sprag.service.faults import Fault, FaultError, SelectionError
 from sprag.service.figures.ribbons import batch_figure
 from sprag.service.http.context import ID_PATTERN, Context, Ctx, StudyId
@@ -121,7 +122,7 @@ async def answered(
     known = [name for name, views in ASKS.items() if STUDY_VIEWS[views[0]].has(study)]
     ask = ask or next(reversed(known), "sensitivity")
     if ask not in ASKS:
-        raise ApiError("not-found", "There is no such question.")
+        raise ApiError("not-found", Sentence("There is no such question."))
     reading = await in_thread(reading_of, context.store, study_id, current().choice)
     params = _places(study, with_held(work.request.query_params, study, reading))
     every = [_asked(study, name, params) for name in (ASKS[ask] if ask in known else ())]

@@ -10,7 +10,7 @@ from urllib.parse import urlencode
 from fastapi import Query, Request
 from starlette.responses import RedirectResponse, Response
 
-from sprag.sentences import Part, Whole
+from sprag.sentences import Part, Sentence, Whole
 from sprag.service.faults import FaultError
 from sprag.service.figures.drawings import drawings
 from sprag.service.figures.read import read_figure
@@ -133,7 +133,7 @@ async def motion_page(
     which = _start_of(row) if which is None else which
     check_start(study, which)
     if show and not (show in PARTS and PARTS[show].has(study)):
-        raise ApiError("not-found", "The cases of this study have no such view.")
+        raise ApiError("not-found", Sentence("The cases of this study have no such view."))
     frame = await in_thread(study_frame, context, study_id)  # of the same moment: the views are computed meanwhile
     params, nothing = work.request.query_params, type(work.request.query_params)()
     along = show in ("", _PHASES)  # other parts have a `from` and a `to` of their own

@@ -133,7 +133,7 @@ def _numbers(found: Ribbon, line: RibbonLine, name: str, place: int, reached: Yi
     nominal = float(line.spreads[name].nominal[place])
     count = digits(high)
     numbers = [
-        KeyNumber(Phrase("Half of the drives above"), middle, unit, digits(middle, half), where=where),
+        KeyNumber(Phrase("Median of the drives"), middle, unit, digits(middle, half), where=where),
         KeyNumber(Phrase("9 of 10 between"), None, unit, count, low, high, where=where),
     ]
     if np.isfinite(nominal):

@@ -26,6 +26,8 @@ MOST: Final = 4
 #: Digits of a number whose error is not known, and the most of any.
 _DIGITS: Final = 3
 _MOST_DIGITS: Final = 5
+#: Digits of a dimension of a design, as beside drawings and in tables: with fewer, typed back, it leaves its limits.
+DIMENSION_DIGITS: Final = 4
 #: Digits of a large number that keeps its ones.
 _WHOLE: Final = 4
 #: Digits of a place of an axis, which is exact.

@@ -11,6 +11,7 @@ from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.reader import Phrase, joined, plural, term
 from sprag.service.results.fronts import history, worst_of
 from sprag.service.results.headlines.headline import (
+    DIMENSION_DIGITS,
     MOST,
     NOTHING,
     Headline,
@@ -103,8 +104,8 @@ def _dimension(found: Designs, best: int, place: int) -> KeyNumber:
     """A parameter of the best design, with its value in the base."""
     path, value = found.plan.vary[place].paths[0], float(found.front.variables[best, place])
     unit, before = unit_of(found.study, path), found.study.base.get(path)
-    note = NOTHING if before is None else Phrase("{value} before", value=Amount(before, unit, 4))
-    return KeyNumber(path, value, unit, digits(value), note=note, case=int(found.front.cases[best, 0]))
+    note = NOTHING if before is None else Phrase("{value} before", value=Amount(before, unit, DIMENSION_DIGITS))
+    return KeyNumber(path, value, unit, DIMENSION_DIGITS, note=note, case=int(found.front.cases[best, 0]))
 
 
 def _limit(found: Designs, best: int, limit: Limit) -> KeyNumber:

@@ -14,7 +14,8 @@ from sprag.service.figures.pictures import draw_compare, draw_curves
 from sprag.service.figures.pictures import draw_map as paint_map
 from sprag.service.figures.svg import svg
 from sprag.service.http.web.motion import _said
-from sprag.service.reading.reader import Reading
+from sprag.service.languages import language
+from sprag.service.reading.reader import Reading, shown
 from sprag.service.results.curve_cases import draw, draw_map, select
 from sprag.service.results.curves import CurveQuery, Curves
 from sprag.service.results.regimes import MARKS, coasting_sentence, counted, regimes_of, stretches
@@ -145,3 +146,10 @@ def test_a_case_without_a_load_says_to_which_speed_its_motion_over_time_comes() 
     assert coasting_sentence(loaded) is None
     row = CaseRow(0, models.OK, (), {**coasting, "regime": "coasting", "regime.order": 1})
     assert "own start, comes to 40.9 rad/s and keeps it." in " ".join(_said(study, row))
+
+
+def test_regimes_agree_with_their_number() -> None:
+    text = counted({"periodic": 486, "irregular": 24, "unsettled": 1})
+    assert text == "486 periodic, 24 irregular, 1 unsettled"
+    with language("uk"):
+        assert shown(text) == "486 періодичних, 24 нерегулярні, 1 неусталений"

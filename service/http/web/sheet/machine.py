@@ -6,7 +6,7 @@ Each value leads to its field in the form of a variant, which has the same drawi
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
@@ -18,6 +18,7 @@ from sprag.service.languages import gettext
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.reader import joined
 from sprag.service.reading.wording import number, unit_text
+from sprag.service.results.headlines.headline import DIMENSION_DIGITS
 from sprag.service.results.varied import with_tolerance
 from sprag.worker import models
 
@@ -26,9 +27,6 @@ if TYPE_CHECKING:
 
     from sprag.service.reading.reader import Reading
     from sprag.worker.study import Study
-
-#: Digits of a value beside a drawing.
-_DIGITS: Final = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +72,7 @@ def _label(study: Study, reading: Reading, path: str, best: Mapping[str, float])
     axis = study.axis_of(path)
     if axis is not None and not best and len(study.axes[axis]) > 1:
         values = study.axes[axis].array
-        low, high = (number(reading.value(float(end), si), _DIGITS) for end in (values.min(), values.max()))
+        low, high = (number(reading.value(float(end), si), DIMENSION_DIGITS) for end in (values.min(), values.max()))
         return f"{low}…{high} {unit_text(reading.unit(si))}".strip()
     value = float(study.axes[axis].array[0]) if axis is not None and not best else study.base[path]
-    return reading.say(joined("", [with_tolerance(study, path, Amount(value, si, _DIGITS))]))
+    return reading.say(joined("", [with_tolerance(study, path, Amount(value, si, DIMENSION_DIGITS))]))
