@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from sprag.service.reading.reader import Choice, Reading
+from sprag.service.results.headlines.headline import KeyNumber, short_titles
 from sprag.service.spec.document import parse_spec
 from sprag.service.views.headline import Headline, headline_of, is_small
 from sprag.service.views.library import Library, reading_of
@@ -151,3 +152,12 @@ def test_a_study_all_of_whose_cases_failed_says_how(service: Service) -> None:
     store.work.settle(epoch, number)
     headline, reading = found(service, study_id)
     assert headline.said(reading).endswith(" cases has a result: chatter.")
+
+
+def test_titles_leave_out_the_part_of_a_machine_where_they_differ_without_it() -> None:
+    reading = Reading("vibration-drive")
+    first, second, arm = (KeyNumber(name, 31.5) for name in
+                          ("pendulums.0.spring_rate", "pendulums.1.spring_rate", "pendulums.0.arm"))  # fmt: skip
+    assert short_titles([first, arm], reading) == ["Spring rate", "Arm of the mass"]
+    assert short_titles([first, second], reading) == ["Spring rate, pendulum 0", "Spring rate, pendulum 1"]
+    assert reading.letter("shaft.irregularity") == "<i>δ</i><sub>ω</sub>"  # δ is the backlash in drawings

@@ -33,6 +33,7 @@ from sprag.service.http.work import Attended
 from sprag.service.languages import N_, _
 from sprag.service.presets import preset_names
 from sprag.service.reading.faults import message
+from sprag.service.results.headlines.headline import short_titles
 from sprag.service.spec.labels import StudyChange, read_change, tags_of
 from sprag.service.spec.report import SpecError
 from sprag.service.storage.errors import ChangedMeanwhileError, StoreError
@@ -131,7 +132,8 @@ def _row(record: StudyRecord, told: Listed | None) -> dict[str, Any]:
         "spark": Markup(drawn),  # noqa: S704 - numbers alone
         "about": reading.say(told.about),
         "answers": [
-            (one.number(reading), one.unit_text(reading), one.title(reading), reading.say(one.where)) for one in numbers
+            (one.number(reading), one.unit_text(reading), title, reading.say(one.where))
+            for one, title in zip(numbers, short_titles(numbers, reading), strict=True)
         ],
     }
 

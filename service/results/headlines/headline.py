@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -169,6 +170,13 @@ def digits(value: float, half_width: float | None = None) -> int:
 def amount(info: ResultInfo, value: float, half_width: float | None = None) -> Amount:
     """A result for a sentence."""
     return Amount(value, info.unit, digits(value, half_width))
+
+
+def short_titles(numbers: Sequence[KeyNumber], reading: Reading) -> list[str]:
+    """The titles of numbers, without the part of the machine where they differ without it."""
+    titles = [one.title(reading) for one in numbers]
+    short = [re.sub(r", [^,]*\d+$", "", title) for title in titles]
+    return short if len(set(short)) == len(short) else titles
 
 
 def trace_of(x: Sequence[float], y: NDArray[np.float64], at: int | None = None) -> Trace | None:

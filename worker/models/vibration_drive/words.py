@@ -99,7 +99,7 @@ LETTERS: Final[dict[str, tuple[str, str]]] = {
     "shaft.speed.mean": ("ω", "e"),
     "shaft.speed.max": ("ω", "e max"),
     "shaft.speed.min": ("ω", "e min"),
-    "shaft.irregularity": ("δ", ""),
+    "shaft.irregularity": ("δ", "ω"),
     "torque.mean": ("M", ""),
     "torque.max": ("M", "max"),
     "power.useful.mean": ("P", "c"),

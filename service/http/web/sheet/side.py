@@ -16,6 +16,7 @@ from sprag.service.languages import N_, gettext
 from sprag.service.reading.part_names import lower_first
 from sprag.service.reading.reader import Phrase, joined, term
 from sprag.service.results.defaults import main_query, varying_axes
+from sprag.service.results.headlines.headline import short_titles
 from sprag.service.results.regimes import DOUBTFUL
 from sprag.service.views.headline import headline_of, is_small
 from sprag.service.views.relatives import asked_by, relatives_of
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
     from sprag.service.reading.reader import Reading
     from sprag.service.storage.studies.records import Kinds, Progress
-    from sprag.service.views.headline import Headline, KeyNumber, Trace
+    from sprag.service.views.headline import Headline, Trace
     from sprag.service.views.library import Library
     from sprag.service.views.relatives import Asked, Relative
     from sprag.worker.study import Study
@@ -178,17 +179,6 @@ def brief(headline: Headline | None, reading: Reading) -> str:
     return f"{value}: {', '.join(told)}"
 
 
-def short_titles(numbers: Sequence[KeyNumber], reading: Reading) -> list[str]:
-    """The titles of numbers, without the part of the machine where they differ without it."""
-    return short_captions([one.title(reading) for one in numbers])
-
-
-def short_captions(titles: Sequence[str]) -> list[str]:
-    """Captions without the part of the machine where they differ without it."""
-    short = [title.partition(",")[0] for title in titles]
-    return short if len(set(short)) == len(short) else list(titles)
-
-
 def _variants(
     library: Library,
     study_id: str,
@@ -224,7 +214,7 @@ def _first(headline: Headline | None, reading: Reading) -> str:
     if headline is None or not headline.numbers:
         return ""
     first = headline.numbers[0]
-    return f"{first.title(reading)} {first.number(reading)} {first.unit_text(reading)}".strip()
+    return f"{short_titles([first], reading)[0]} {first.number(reading)} {first.unit_text(reading)}".strip()
 
 
 def _spark(trace: Trace | None) -> Markup:

@@ -11,10 +11,11 @@ from sprag.service.faults import SelectionError
 from sprag.service.http.web.held import fixed_choices, with_held
 from sprag.service.http.web.sheet.chart import CHOICES, chart_of, chosen_curves, point_of
 from sprag.service.http.web.sheet.machine import Machine, machine_of
-from sprag.service.http.web.sheet.side import Side, short_titles, side_of
+from sprag.service.http.web.sheet.side import Side, side_of
 from sprag.service.http.web.view_forms import Fact, fact_of
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.results.choice import value_choices
+from sprag.service.results.headlines.headline import short_titles
 from sprag.service.views.headline import headline_of, usual_query
 from sprag.service.views.library import reading_of
 
