@@ -174,9 +174,13 @@ def amount(info: ResultInfo, value: float, half_width: float | None = None) -> A
 
 def short_titles(numbers: Sequence[KeyNumber], reading: Reading) -> list[str]:
     """The titles of numbers, without the part of the machine where they differ without it."""
-    titles = [one.title(reading) for one in numbers]
+    return short_captions([one.title(reading) for one in numbers])
+
+
+def short_captions(titles: Sequence[str]) -> list[str]:
+    """Captions without the part of the machine where they differ without it."""
     short = [re.sub(r", [^,]*\d+$", "", title) for title in titles]
-    return short if len(set(short)) == len(short) else titles
+    return short if len(set(short)) == len(short) else list(titles)
 
 
 def trace_of(x: Sequence[float], y: NDArray[np.float64], at: int | None = None) -> Trace | None:

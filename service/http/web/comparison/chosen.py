@@ -10,7 +10,6 @@ from sprag.sentences import Sentence
 from sprag.service.answers.differing import MOST_COMPARED, common_axes, unique_names
 from sprag.service.faults import SelectionError, refused
 from sprag.service.http.web.sheet.chart import results_of
-from sprag.service.http.web.sheet.side import short_captions
 from sprag.service.languages import N_
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.limits import at_most
@@ -20,6 +19,7 @@ from sprag.service.results.curve_cases import draw, select
 from sprag.service.results.curves import CurveQuery, Curves
 from sprag.service.results.defaults import main_query
 from sprag.service.results.differences import differences
+from sprag.service.results.headlines.headline import short_captions
 from sprag.service.results.selection import value_of
 from sprag.service.views.relatives import asked_by, what_differs
 from sprag.worker import models
