@@ -24,6 +24,8 @@ NAMES_COOKIE: Final = "sprag_names"
 #: The time zone that somebody chose, and that in which the browser is (static/reader.js).
 ZONE_COOKIE: Final = "sprag_zone"
 HERE_COOKIE: Final = "sprag_here"
+#: The zone of an office that has set none.
+UTC: Final = "UTC"
 _YEAR: Final = 365 * 24 * 3600
 
 
@@ -39,7 +41,8 @@ async def page_choice(request: Request, context: Ctx) -> Choice:
     read_units(units)
     choice = Choice(units or usual, names or CAPTIONS)
     chosen, here = (_zone(unquote(kept.get(name, ""))) for name in (ZONE_COOKIE, HERE_COOKIE))
-    learn(choice=choice, usual=usual, zone=chosen or here or office, chosen_zone=chosen)
+    zone = chosen or here or office
+    learn(choice=choice, usual=usual, zone=zone, zone_known=bool(chosen or here) or office != UTC, chosen_zone=chosen)
     if request.method == "GET":  # the address of a page that answers a form may have no page of its own
         # What the address says would hide what is chosen next.
         own = request.url.remove_query_params(["units", "names", "language"])

@@ -63,15 +63,15 @@ FIELDS: Final = (
     *("name", "spec", "cron", "at", "zone", "window", "finish_by", *PLAIN, "misfire_grace", "paused_until"),
     *("trouble_flags", "report_email", "report_webhook"),
 )
-_CRON_ALLOWED: Final = N_(
+CRON_ALLOWED: Final = N_(
     'five fields, such as "0 22 * * 1-5": at 22:00 from Monday to Friday; or "@daily" and the like'
 )
-_AT_ALLOWED: Final = N_('a future time, such as "2027-01-31T22:00"')
+AT_ALLOWED: Final = N_("a future time, such as 2027-01-31 22:00")
 _WHEN_ALLOWED: Final = N_(
     'either `cron`, five fields, such as "0 22 * * 1-5": at 22:00 from Monday to Friday; or "@daily" and the like; or '
-    '`at`, a future time, such as "2027-01-31T22:00"'
+    "`at`, a future time, such as 2027-01-31 22:00"
 )
-_WINDOW_ALLOWED: Final = N_('two different times of day, such as ["22:00", "06:00"]')
+_WINDOW_ALLOWED: Final = N_("two different times of day, such as 22:00 and 06:00")
 _LONGEST_CRON: Final = 200
 #: Runs of a new schedule whose window is compared with their deadline.
 _RUNS_LOOKED_AT: Final = 7
@@ -267,7 +267,7 @@ def _read_timing(
                 raise TimingError("invalid-time", "is not a cron expression")
             check_cron(cron)
         except TimingError as error:
-            report.fault("/cron", error.code, error.message, cron, allowed=_CRON_ALLOWED)
+            report.fault("/cron", error.code, error.message, cron, allowed=CRON_ALLOWED)
             return None
         return Timing(" ".join(cron.split()), None, zone)
     try:
@@ -277,7 +277,7 @@ def _read_timing(
         if moment <= now and not (old is not None and old.timing.at == moment):
             raise TimingError("out-of-range", "is in the past")
     except TimingError as error:
-        report.fault("/at", error.code, error.message, at, allowed=_AT_ALLOWED)
+        report.fault("/at", error.code, error.message, at, allowed=AT_ALLOWED)
         return None
     return Timing(None, moment, zone)
 
@@ -292,7 +292,7 @@ def _read_pause(report: Report, value: object, zone: str, now: datetime, old: Sc
         if moment <= now and not (old is not None and old.policies.paused_until == moment):
             raise TimingError("out-of-range", "is in the past")
     except TimingError as error:
-        report.fault("/paused_until", error.code, error.message, value, allowed=_AT_ALLOWED)
+        report.fault("/paused_until", error.code, error.message, value, allowed=AT_ALLOWED)
         return None
     return moment
 

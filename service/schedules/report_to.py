@@ -17,9 +17,7 @@ if TYPE_CHECKING:
 
 MOST_RECIPIENTS: Final = 10
 LONGEST_WEBHOOK: Final = 500
-EMAIL_ALLOWED: Final = Sentence(
-    'a list of at most {count} different addresses, such as ["dora@example.com"]', count=MOST_RECIPIENTS
-)
+EMAIL_ALLOWED: Final = Sentence("at most {count} different addresses, such as dora@example.com", count=MOST_RECIPIENTS)
 WEBHOOK_ALLOWED: Final = Sentence(
     "an address of http or https without user and fragment, at most {count} characters", count=LONGEST_WEBHOOK
 )
@@ -89,7 +87,12 @@ def require_deliverable(wanted: ReportTo, delivery: Delivery) -> None:
     """
     report = Report(wanted.to_json())
     if wanted.email and delivery.mail_server is None:
-        report.fault("/report_email", "conflict", "no mail is sent here", allowed="[], until SPRAG_SMTP_URL is set")
+        report.fault(
+            "/report_email",
+            "conflict",
+            "no mail is sent here",
+            allowed="none, until the administrator sets a mail server (SPRAG_SMTP_URL)",
+        )
     for number, address in enumerate(wanted.email):
         if not mail_allowed(address, delivery):
             allowed = Sentence("addresses of {domains} (SPRAG_MAIL_DOMAINS)", domains=", ".join(delivery.domains))
@@ -101,13 +104,15 @@ def require_deliverable(wanted: ReportTo, delivery: Delivery) -> None:
                 allowed=allowed,
             )
     if wanted.webhook is not None and origin_of(wanted.webhook) not in delivery.origins:
-        known = ", ".join(delivery.origins) if delivery.origins else Sentence("none")
+        allowed = Sentence("none, until the administrator allows origins (SPRAG_WEBHOOK_ORIGINS)")
+        if delivery.origins:
+            allowed = Sentence("addresses at {origins} (SPRAG_WEBHOOK_ORIGINS)", origins=", ".join(delivery.origins))
         report.fault(
             "/report_webhook",
             "invalid-choice",
             "has an origin to which no webhooks go",
             wanted.webhook,
-            allowed=Sentence("addresses at {origins} (SPRAG_WEBHOOK_ORIGINS)", origins=known),
+            allowed=allowed,
         )
     report.raise_if_any()
 

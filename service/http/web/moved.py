@@ -7,6 +7,7 @@ from typing import Final
 from fastapi import Request
 from starlette.responses import RedirectResponse, Response
 
+from sprag.service.http.context import CaseNumber, StudyId
 from sprag.service.http.routers import page_router
 
 router = page_router()
@@ -22,16 +23,65 @@ MOVED: Final = {
     "/schedules": "/nights",
     "/schedules/new": "/nights/new",
     "/docs": "/help/interface",
+    "/tokens": "/me",
 }
+#: Parts of the address of a study, and the page that answers what they ask; "" for the sheet.
+OF_STUDY: Final = {
+    "answers": "",
+    "designs": "rows",
+    "report": "document",
+    "reports": "document",
+    "ribbon": "matters",
+    "tolerances": "matters",
+    "yield": "matters",
+    "figures/answers": "",
+    "figures/calibration": "calibration",
+    "figures/curves": "curves",
+    "figures/explore": "explore",
+    "figures/front": "front",
+    "figures/map": "map",
+    "figures/ribbon": "matters",
+    "figures/search": "rows",
+    "figures/sensitivity": "sensitivity",
+    "figures/yield": "matters",
+}
+#: Pages that a case had, all on its own now.
+OF_CASE: Final = ("motion", "strobes", "trajectory")
+
+
+def _to(address: str, request: Request) -> Response:
+    query = request.url.query
+    return RedirectResponse(address + (f"?{query}" if query else ""), 308)
 
 
 async def _moved(request: Request) -> Response:
-    query = request.url.query
-    return RedirectResponse(MOVED[request.url.path] + (f"?{query}" if query else ""), 308)
+    return _to(MOVED[request.url.path], request)
 
 
 for _old in MOVED:
     router.get(_old)(_moved)
+
+
+def _of_study(old: str, new: str) -> None:
+    @router.get(f"/studies/{{study_id:study}}/{old}")
+    async def moved(request: Request, study_id: StudyId) -> Response:
+        """An address of a study that has no page of its own."""
+        return _to(f"/studies/{study_id}/{new}".rstrip("/"), request)
+
+
+for _old, _new in OF_STUDY.items():
+    _of_study(_old, _new)
+
+
+def _of_case(old: str) -> None:
+    @router.get(f"/studies/{{study_id:study}}/cases/{{case:case}}/{old}")
+    async def moved(request: Request, study_id: StudyId, case: CaseNumber) -> Response:
+        """A view that a case had as a page of its own."""
+        return _to(f"/studies/{study_id}/cases/{case}", request)
+
+
+for _old in OF_CASE:
+    _of_case(_old)
 
 
 @router.get("/schedules/{schedule_id:schedule}")
@@ -42,5 +92,5 @@ async def moved_schedule(schedule_id: str) -> Response:
 
 @router.get("/docs/{name}")
 async def moved_manual(name: str) -> Response:
-    """A page of the manual."""
-    return RedirectResponse(f"/help/{name}", 308)
+    """A page of the manual, also by the name of its file."""
+    return RedirectResponse(f"/help/{name.removesuffix('.md')}", 308)

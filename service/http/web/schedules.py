@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from datetime import datetime
 from typing import Annotated, Any, Final
 from zoneinfo import ZoneInfo
@@ -31,7 +32,7 @@ from sprag.service.languages import N_, gettext
 from sprag.service.presets import preset_names
 from sprag.service.reading.faults import allowed_text, fault_text
 from sprag.service.reading.reader import meanings
-from sprag.service.schedules.fields import ScheduleFields, change_fields
+from sprag.service.schedules.fields import AT_ALLOWED, CRON_ALLOWED, ScheduleFields, change_fields
 from sprag.service.schedules.plain import DAYS, cron_of, days_of, said
 from sprag.service.schedules.report_to import require_deliverable
 from sprag.service.schedules.trouble import usual_flags
@@ -75,6 +76,7 @@ _FLAG: Final = "trouble_flags/"
 _WITH_FLAGS: Final = "trouble_flags"
 #: Field of the form by the first part of a fault's JSON Pointer.
 _FIELD_OF: Final = {"window": "window_begin", "spec": "source"}
+_CLOCK_ALLOWED: Final = N_("hours and minutes, such as 22:00")
 
 
 @router.get("/nights")
@@ -94,7 +96,8 @@ def nights(context: Ctx, hours: Annotated[float, Query(ge=1, le=MOST_HOURS)] = H
 @router.get("/nights/new")
 def new_schedule(context: Ctx, study: Annotated[str | None, Query(max_length=80)] = None) -> Response:
     """The form, empty, or for a study."""
-    values = {**_EMPTY, "zone": current().zone, **_ticks(_usual())}
+    # A wrong zone would shift every run: where nobody has said it, the browser or the reader fills it in.
+    values = {**_EMPTY, "zone": current().zone if current().zone_known else "", **_ticks(_usual())}
     if study is not None:
         context.store.studies.get(study)
         values["source"] = f"study {study}"
@@ -158,8 +161,8 @@ async def _save(context: Context, work: Work, values: Values, schedule_id: str |
             await in_thread(context.store.schedules.change, schedule_id, fields, read)
     except SpecError as error:
         for fault in error.faults:
-            first = fault.where.split("/")[1] if fault.where else ""
-            faults.setdefault(_FIELD_OF.get(first, first), []).append(_sentence(fault))
+            field, said_there = _beside(fault, values.get("when", ""))
+            faults.setdefault(field, []).append(_sentence(said_there))
     except (StudyNotFoundError, TooManySchedulesError) as error:
         faults["source"] = [str(error)]
     except ChangedMeanwhileError:
@@ -170,6 +173,19 @@ async def _save(context: Context, work: Work, values: Values, schedule_id: str |
     if faults:
         return await in_thread(_form, context, values, faults, schedule_id, status=422)
     return RedirectResponse("/nights", status_code=303)
+
+
+def _beside(fault: Fault, when: str) -> tuple[str, Fault]:
+    """The field that a fault is about, and the fault as it is there: a program gives all three ways in two fields."""
+    first = fault.where.split("/")[1] if fault.where else ""
+    if first != "cron":
+        return _FIELD_OF.get(first, first), fault
+    missing = fault.code == "exactly-one"
+    if when == "days":
+        return "clock", replace(fault, message="is not a time of day", allowed=_CLOCK_ALLOWED)
+    if when == "at":
+        return "at", replace(fault, message="is required", allowed=AT_ALLOWED)
+    return "cron", replace(fault, message="is required", allowed=CRON_ALLOWED) if missing else fault
 
 
 def _sentence(fault: Fault) -> str:
@@ -208,7 +224,7 @@ def _data_of(context: Context, values: Mapping[str, str]) -> dict[str, Any]:
         "report_webhook": values.get("report_webhook", "").strip() or None,
     }
     if _WITH_FLAGS in values:
-        ticked = [flag for flag in _flags() if _FLAG + flag in values]
+        ticked = [flag for some in _flags().values() for flag in some if _FLAG + flag in values]
         # Those that count by default stand for the ones that the model of the study has.
         data["trouble_flags"] = None if set(ticked) == _usual() else ticked
     if values.get("when") == "days":
@@ -224,9 +240,27 @@ def _data_of(context: Context, values: Mapping[str, str]) -> dict[str, Any]:
     return data
 
 
-def _flags() -> dict[str, str]:
-    """Every flag that a case of some model can have, with its description."""
-    return {flag: text for model in models.model_names() for flag, text in models.flags_of(model).items()}
+def _flags() -> dict[str, dict[str, str]]:
+    """By model the flags that its cases can have, with their descriptions."""
+    return {model: dict(flags) for model in models.model_names() if (flags := models.flags_of(model))}
+
+
+def _offered(context: Context, values: Mapping[str, str], schedule_id: str | None) -> dict[str, dict[str, str]]:
+    """`_flags` of the model of the chosen study, and those that are ticked; of every model while none is chosen."""
+    spec = None
+    with suppress(StudyNotFoundError):
+        spec = _data_of(context, values).get("spec")
+    if spec is None and schedule_id is not None:
+        spec = context.store.schedules.get(schedule_id).fields.spec
+    if spec is None:
+        return {model: meanings(flags) for model, flags in _flags().items()}
+    chosen, usual = spec.get("model", models.VIBRATION_DRIVE), _usual()
+    kept = {
+        model: {flag: text for flag, text in flags.items()
+                if model == chosen or (_FLAG + flag in values and flag not in usual)}
+        for model, flags in _flags().items()
+    }  # fmt: skip
+    return {model: meanings(flags) for model, flags in kept.items() if flags}
 
 
 def _usual() -> set[str]:
@@ -291,7 +325,7 @@ def _form(
         schedule_id=schedule_id,
         studies=studies,
         presets=[preset_of(name) for name in preset_names()],
-        flags=meanings(_flags()),
+        flags=_offered(context, values, schedule_id),
         zones=sorted(zones()),
         days=DAYS,
         most_priority=MAX_PRIORITY,

@@ -61,6 +61,8 @@ ACTIONS: Final = {
     "delete": (N_("Delete"), N_("deleted")),
     "restore": (N_("Restore"), N_("restored")),
 }
+#: Those that need a tag.
+_TAGGING: Final = ("tag", "untag")
 _UNDO: Final = {"archive": "unarchive", "delete": "restore"}
 #: Parameters of the list itself; others of its address say what was done before.
 _OWN: Final = ("search", "state", "tag", "owner", "model", "archived", "deleted", "trouble", "sort")
@@ -84,7 +86,16 @@ def index(context: Ctx, request: Request) -> Response:
     return _list(context, request.query_params)
 
 
-def _list(context: Context, given: QueryParams, refused: Sequence[tuple[str, str]] = (), status: int = 200) -> Response:
+def _list(
+    context: Context,
+    given: QueryParams,
+    refused: Sequence[tuple[str, str]] = (),
+    status: int = 200,
+    *,
+    untagged: bool = False,
+    chosen: Sequence[str] = (),
+) -> Response:
+    """The page; ``untagged`` where a tag is missing for the ``chosen`` studies, which stay chosen."""
     wanted, order = _asked(given)
     found = listed(context, given)
     own = {name: value for name in _OWN if (value := given.get(name))}
@@ -111,6 +122,8 @@ def _list(context: Context, given: QueryParams, refused: Sequence[tuple[str, str
         undo=_UNDO.get(done) if done != "delete" or context.settings.restore_days else None,
         changed=given.getlist("changed")[:_LISTED],
         refused=refused,
+        untagged=untagged,
+        chosen=chosen,
         general=general,
         view_actions=saved_views.view_actions(),
         here_saved=saved_views.saved_here(general, "studies", None, urlencode(own)),
@@ -203,8 +216,11 @@ def change_many(context: Ctx, request: Request, pairs: RepeatedForm) -> Response
     chosen = list(dict.fromkeys(value for name, value in pairs if name == "study"))
     kept = context.settings.restore_days
     done: str = choice_of("do", fields.get("do", ""), [name for name in ACTIONS if kept or name != "delete"])
+    tags = fields.get("tags", "")
     back = [(name, value) for name, value in request.query_params.items() if name in _OWN]
-    refused = _changed(chosen, _action(context, done, fields.get("tags", "")))
+    if done in _TAGGING and not tags_of(tags):
+        return _list(context, QueryParams(back), status=422, untagged=True, chosen=chosen)
+    refused = _changed(chosen, _action(context, done, tags))
     if refused:
         # The rest is done, and the list shows it.
         return _list(context, QueryParams(back), refused, 409)

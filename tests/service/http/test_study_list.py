@@ -144,6 +144,11 @@ def test_buttons_of_the_page_change_many_studies(service: Service, three: dict[s
     press("untag", "feeder", tags="day")
     assert names(service, tag="day") == ["Äpfel"]
     assert press("tag", "feeder", tags="x" * 50).status_code == 422
+    for do in ("tag", "untag"):
+        without = press(do, "feeder", tags=" ,")
+        assert without.status_code == 422
+        assert "No tag was typed: nothing has changed." in without.text
+        assert f'value="{three["feeder"]}" checked' in without.text
     done = press("archive", "Äpfel", query="?tag=day")
     assert ("1 study is archived." in done.text, rows(done.text)) == (True, [])
     assert 'value="unarchive">Undo' in done.text

@@ -14,9 +14,11 @@ from sprag.service import languages
 from sprag.service.http.views import preset_of
 from sprag.service.jobs.reports.message import sentence
 from sprag.service.jobs.scheduler import Scheduler
+from sprag.service.jobs.submission import accept
 from sprag.service.schedules.fields import change_fields, read_fields
 from sprag.service.schedules.outcomes import Outcome, Result
 from sprag.service.schedules.trouble import usual_flags
+from sprag.service.spec.document import parse_spec
 from sprag.service.spec.report import SpecError
 from sprag.worker import models
 from tests.service.conftest import made_up
@@ -280,6 +282,22 @@ def test_the_form_says_what_is_wrong_in_the_language_of_the_page(service: Servic
     usual = {**shaft, "trouble_flags/unsettled": "on", "trouble_flags/not_settled": "on"}
     del usual["trouble_flags/jumped"]
     assert service.http.post("/nights/new", data=usual).status_code == 303, "the usual ones fit every model"
+
+
+def test_the_form_of_a_study_has_the_flags_of_its_model(service: Service) -> None:
+    shaft, drive = (accept(service.store, parse_spec(spec)).id for spec in (SHAFT, SPEC))
+    page = service.http.get(f"/nights/new?study={shaft}").text
+    assert "trouble_flags" not in page
+    assert "What needs attention" not in page
+    assert (
+        service.http.post(
+            "/nights/new", data={"source": f"study {shaft}", "when": "cron", "cron": "@daily", "zone": "UTC"}
+        ).status_code
+        == 303
+    )
+    assert "trouble_flags" not in service.http.get(f"/nights/{service.store.schedules.all()[0].id}").text
+    assert "trouble_flags/jumped" in service.http.get(f"/nights/new?study={drive}").text
+    assert '<p class="soft">Vibration drive</p>' in service.http.get("/nights/new").text, "before one is chosen"
 
 
 def test_the_example_of_a_cron_expression_keeps_its_asterisks(service: Service) -> None:

@@ -13,6 +13,7 @@
       document.querySelectorAll("time").forEach((time, place) => { if (times[place]) time.replaceWith(times[place].cloneNode(true)); });
     }).catch(() => {});
   }
+  document.querySelectorAll("input[data-here]").forEach((field) => { field.value ||= own; });
   const address = new URL(location.href);
   if (units && !address.searchParams.has("units")) {
     address.searchParams.set("units", units);

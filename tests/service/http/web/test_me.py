@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING
+from html import unescape
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from playwright.sync_api import expect
 
-from sprag.service.http.web.moved import MOVED
+from sprag.service.http.web.moved import MOVED, OF_CASE, OF_STUDY
 from sprag.service.languages import language
 from sprag.service.reading.times import in_full, when
 from sprag.service.schedules.plain import cron_of, days_of, said
@@ -59,7 +60,16 @@ def test_old_addresses_lead_to_where_their_content_went(service: Service) -> Non
         answer = service.http.get(f"{old}?hours=12", follow_redirects=False)
         assert (answer.status_code, answer.headers["location"]) == (308, f"{new}?hours=12")
         assert service.http.get(new).status_code == 200, new
-    assert service.http.get("/docs/guide", follow_redirects=False).headers["location"] == "/help/guide"
+    for name in ("guide", "guide.md"):
+        assert service.http.get(f"/docs/{name}", follow_redirects=False).headers["location"] == "/help/guide"
+
+
+def test_old_addresses_of_a_study_lead_to_pages(service: Service, spec: dict[str, Any]) -> None:
+    study = f"/studies/{service.http.post('/api/v1/studies', json=spec).json()['id']}"
+    for old in (*OF_STUDY, *(f"cases/0/{name}" for name in OF_CASE)):
+        answer = service.http.get(f"{study}/{old}", follow_redirects=True)
+        assert (answer.status_code, len(answer.history) > 0) == (200, True), old
+        assert answer.headers["content-type"].startswith("text/html"), old
 
 
 @pytest.mark.parametrize(
@@ -92,7 +102,42 @@ def test_a_schedule_is_made_of_days_and_a_time(service: Service) -> None:
     assert "on working days at 21:05" in service.http.get("/nights").text
     wrong = service.http.post("/nights/new", data={**form, "clock": "late"})
     assert wrong.status_code == 422
-    assert 'id="wrong-cron" role="alert"' in wrong.text
+    assert (
+        'id="wrong-clock" role="alert">is not a time of day; allowed: hours and minutes, such as 22:00<' in wrong.text
+    )
+
+
+def test_a_zone_that_nobody_said_is_asked_for(service: Service) -> None:
+    form = {"source": "preset one_pendulum", "when": "days", "days": "1-5", "clock": "22:00"}
+    zone = '<input id="zone" name="zone" type="text" value="{}"'
+    assert zone.format("") in service.http.get("/nights/new").text
+    assert (
+        zone.format("Asia/Tokyo") in service.http.get("/nights/new", headers={"Cookie": "sprag_here=Asia%2FTokyo"}).text
+    )
+    refused = service.http.post("/nights/new", data={**form, "zone": ""})
+    assert (refused.status_code, 'id="wrong-zone" role="alert"' in refused.text) == (422, True)
+
+
+@pytest.mark.parametrize(
+    ("changes", "field", "text"),
+    [
+        ({"clock": ""}, "clock", "is not a time of day; allowed: hours and minutes, such as 22:00"),
+        ({"when": "at"}, "at", "is required; allowed: a future time, such as 2027-01-31 22:00"),
+        ({"when": "cron"}, "cron", 'is required; allowed: five fields, such as "0 22 * * 1-5"'),
+        ({"window_begin": "22:00"}, "window_begin", "allowed: two different times of day, such as 22:00 and 06:00"),
+        ({"report_email": "dora"}, "report_email", "at most 10 different addresses, such as dora@example.com"),
+        ({"report_email": "a@b.example"}, "report_email", "none, until the administrator sets a mail server"),
+        ({"report_webhook": "https://a.example/x"}, "report_webhook", "none, until the administrator allows origins"),
+    ],
+)
+def test_faults_of_a_schedule_stand_beside_what_was_typed(
+    service: Service, changes: dict[str, str], field: str, text: str
+) -> None:
+    form = {"source": "preset one_pendulum", "when": "days", "days": "1-5", "clock": "22:00", "zone": "Europe/Kyiv"}
+    page = unescape(service.http.post("/nights/new", data={**form, **changes}).text)
+    fault = page[page.index(f'id="wrong-{field}" role="alert"') :].partition("</span>")[0]
+    assert text in fault, fault
+    assert page.count('role="alert">') == 1 or field == "report_email"
 
 
 def test_times_are_in_the_zone_of_the_browser_or_in_the_chosen_one(
