@@ -48,7 +48,7 @@ class Drawing:
     """One picture of a machine or a part of it: sizes in px, its shapes as SVG without labels.
 
     ``about`` says in a sentence what it shows; ``frames`` are the places of what moves over a turn of the shaft, as
-    JSON, where the numbers alone say them.
+    JSON, where the numbers alone say them; ``at`` is the path of the part that it shows, "" for the whole machine.
     """
 
     title: str
@@ -58,6 +58,7 @@ class Drawing:
     shapes: str
     dimensions: tuple[Dimension, ...] = ()
     frames: str = ""
+    at: str = ""
 
     def labelled(self, symbols: Mapping[str, str]) -> Drawing:
         """With the symbols of the catalogue, and without dimensions that the machine does not have."""
@@ -71,11 +72,11 @@ def svg(
 ) -> str:  # fmt: skip
     """The drawing with a letter at each dimension, or with a label beside it where ``labels`` has one for its path.
 
-    ``links`` has addresses of labels by their paths. ``alone`` gives it the name space and the colours that it has as
-    a file.
+    ``links`` has addresses of labels or letters by their paths; those of letters are no stops of the Tab key. ``alone``
+    gives it the name space and the colours that it has as a file.
     """
     beside = 0.0 if labels is None else max([_LABEL, *(_room(each, labels) for each in drawing.dimensions)])
-    text = _letters(drawing) if labels is None else _beside(drawing, labels, links or {})
+    text = _letters(drawing, links or {}) if labels is None else _beside(drawing, labels, links or {})
     space = ' xmlns="http://www.w3.org/2000/svg"' if alone else ""
     role = "group" if links else "img"
     frames = f' data-frames="{escape(drawing.frames)}"' if drawing.frames and not alone else ""
@@ -98,26 +99,39 @@ def rows_of(drawing: Drawing, side: Side) -> tuple[Dimension, ...]:
     return tuple(sorted((each for each in drawing.dimensions if each.side == side), key=lambda each: each.y))
 
 
-def leaders(drawing: Drawing, step: float, gap: float, at: float) -> str:
-    """Lines from dimensions to fields that stand in two columns beside the drawing, ``step`` px from one to the next.
+def balanced(dimensions: Sequence[Dimension]) -> tuple[tuple[Dimension, ...], tuple[Dimension, ...]]:
+    """Dimensions in two columns of about the same length, each from top to bottom: the left half and the right half."""
+    across = sorted(dimensions, key=lambda each: each.x)
+    half = (len(across) + 1) // 2
+    left, right = (tuple(sorted(own, key=lambda each: each.y)) for own in (across[:half], across[half:]))
+    return left, right
 
-    ``gap`` is the distance of the columns from the drawing, ``at`` the place in each field to which its line goes.
+
+def with_leaders(
+    drawing: Drawing, step: float, gap: float, at: float, rows: Sequence[Sequence[Dimension]] | None = None,
+    links: Mapping[str, str] | None = None,
+) -> str:  # fmt: skip
+    """The drawing as `svg` gives it, behind it lines from dimensions to fields in two columns beside it.
+
+    Parameters
+    ----------
+    step, gap, at : distances of two fields, of the columns from the drawing, and of a line's end from the top of its
+        field (px); the drawing is in the middle of the height of the columns
+    rows : dimensions of the fields of both columns, from top to bottom; by default all, at their sides
+    links : as of `svg`
     """
-    found = []
-    for side, edge in (("left", -gap), ("right", drawing.width + gap)):
-        for row, each in enumerate(rows_of(drawing, side)):  # type: ignore[arg-type]
-            found.append(f"M{edge:g} {row * step + at:g}L{each.x:g} {each.y:g}")
-    return f'<path class="leader" d="{"".join(found)}"/>' if found else ""
-
-
-def with_leaders(drawing: Drawing, step: float, gap: float, at: float) -> str:
-    """The drawing as `svg` gives it, with the lines of `leaders` behind it."""
-    text = svg(drawing)
+    sides = rows or (rows_of(drawing, "left"), rows_of(drawing, "right"))
+    above = max(max(map(len, sides)) * step - drawing.height, 0.0) / 2
+    lines = "".join(
+        f"M{edge:g} {row * step + at - above:g}L{each.x:g} {each.y:g}"
+        for side, edge in zip(sides, (-gap, drawing.width + gap), strict=True) for row, each in enumerate(side)
+    )  # fmt: skip
+    text = svg(drawing, links=links)
     place = text.index(">") + 1
-    return text[:place] + leaders(drawing, step, gap, at) + text[place:]
+    return text[:place] + (f'<path class="leader" d="{lines}"/>' if lines else "") + text[place:]
 
 
-def _letters(drawing: Drawing) -> str:
+def _letters(drawing: Drawing, links: Mapping[str, str]) -> str:
     """The symbols at their places; of two at one place the first."""
     found, taken = list[str](), list[Dimension]()
     for each in drawing.dimensions:
@@ -126,10 +140,12 @@ def _letters(drawing: Drawing) -> str:
         taken.append(each)
         left = each.side == "left"
         end = ' text-anchor="end"' if left else ""
-        found.append(
+        text = (
             f'<text class="letter" data-mark="{escape(each.path)}" x="{each.x + (-7 if left else 7):g}" '
             f'y="{each.y + 4:g}"{end}>{_printed(each.symbol)}</text>'
         )
+        link = links.get(each.path)
+        found.append(f'<a href="{escape(link)}" tabindex="-1">{text}</a>' if link else text)
     return "".join(found)
 
 

@@ -18,17 +18,19 @@ if TYPE_CHECKING:
 
 #: Angle of the shaft in the drawing of a mechanism, in degrees.
 USUAL_ANGLE: Final = 60.0
+#: Width of the drawing of a mechanism between two columns of fields (px).
+BETWEEN_FIELDS: Final = 252.0
 
 
-def drawings(study: Study, angle: float = USUAL_ANGLE) -> tuple[Drawing, ...]:
+def drawings(study: Study, angle: float = USUAL_ANGLE, width: float | None = None) -> tuple[Drawing, ...]:
     """The drawings of a study's base, a mechanism at an angle of its shaft (degrees); none of other models.
 
-    Each has the dimensions that the machine has, with their symbols.
+    Each has the dimensions that the machine has, with their symbols; that of a mechanism is at most ``width`` px wide.
     """
     if models.has_clutches(study):
         return rough_drawings(study.model, study.base)
     if study.model == machine_shaft.MODEL:
-        return machine_drawings(study.structure or {}, study.base, angle)
+        return machine_drawings(study.structure or {}, study.base, angle, width)
     return ()
 
 

@@ -34,10 +34,12 @@ _STAGES: Final = {
 }  # fmt: skip
 
 
-def machine_drawings(structure: Mapping[str, Any], base: Mapping[str, float], angle: float) -> tuple[Drawing, ...]:
+def machine_drawings(
+    structure: Mapping[str, Any], base: Mapping[str, float], angle: float, width: float | None = None
+) -> tuple[Drawing, ...]:
     """The train of a machine, where it has more than a shaft, and each mechanism at an angle of the shaft (degrees).
 
-    A mechanism whose links do not reach has none.
+    A mechanism is at most ``width`` px wide; one whose links do not reach has no drawing.
     """
     angles = np.radians(np.append(np.arange(0.0, 360.0 + STEP, STEP), math.fmod(angle, 360.0)))
     symbols = {path: entry.symbol for path, entry in machine_shaft.parameters_of(structure).items()}
@@ -52,7 +54,8 @@ def machine_drawings(structure: Mapping[str, Any], base: Mapping[str, float], an
         plain = kind in {"none", "table", "formula"}
         title = gettext("Shaft") if plain else titled(mechanism.get("quick_return", kind))
         at = f"parts.{index}." if several else ""
-        found.append(_drawing(_of_part(index + 1, title) if several else title, sketch, f"{at}mechanism.{kind}."))
+        title = _of_part(index + 1, title) if several else title
+        found.append(_drawing(title, sketch, f"{at}mechanism", kind, width or _WIDTH))
     return tuple(drawing.labelled(symbols) for drawing in found)
 
 
@@ -60,8 +63,8 @@ def _of_part(number: int, title: str) -> str:
     return gettext("Part {number}: {title}", number=number, title=title.lower())
 
 
-def _drawing(title: str, sketch: machine_shaft.Sketch, prefix: str) -> Drawing:
-    """The drawing of a sketch, whose last angle is that of the still."""
+def _drawing(title: str, sketch: machine_shaft.Sketch, at: str, kind: str, largest: float) -> Drawing:
+    """The drawing of a sketch, whose last angle is that of the still, at most ``largest`` px wide."""
     reach = [*sketch.joints.values(), *sketch.guides]
     for plate in sketch.plates:
         size = float(np.hypot(*plate.outline.T).max())
@@ -69,7 +72,7 @@ def _drawing(title: str, sketch: machine_shaft.Sketch, prefix: str) -> Drawing:
     every = np.concatenate(reach)
     low, high = every.min(axis=0), every.max(axis=0)
     span = np.maximum(high - low, 1e-12)
-    scale = float(min((_WIDTH - 2.0 * _MARGIN) / span[0], (_HEIGHT - 2.0 * _MARGIN) / span[1]))
+    scale = float(min((largest - 2.0 * _MARGIN) / span[0], (_HEIGHT - 2.0 * _MARGIN) / span[1]))
 
     def placed(points: Floats) -> Floats:
         return np.asarray(np.round((points - (low[0], high[1])) * (scale, -scale) + _MARGIN, _ROUNDED))
@@ -89,8 +92,9 @@ def _drawing(title: str, sketch: machine_shaft.Sketch, prefix: str) -> Drawing:
         width,
         height,
         "".join(_shapes(sketch, joints, turns, [placed(line) for line in sketch.guides], scale)),
-        tuple(_dimensions(sketch, joints, prefix, width)),
+        tuple(_dimensions(sketch, joints, f"{at}.{kind}.", width)),
         json.dumps(frames, separators=(",", ":")),
+        at,
     )
 
 
@@ -175,7 +179,7 @@ def _train(structure: Mapping[str, Any], base: Mapping[str, float]) -> Iterator[
         dimensions.append(Dimension("drive.flywheel.diameter", "", x + 48, _LEVEL + 28, "right"))
     shapes.append(f'<circle class="solid" cx="{end:g}" cy="{_LEVEL:g}" r="4"/>')
     about = gettext("Drawing of the train: from the motor to the shaft of the machine")
-    yield Drawing(gettext("Train"), about, end + 24.0, 2 * _LEVEL, "".join(shapes), tuple(dimensions))
+    yield Drawing(gettext("Train"), about, end + 24.0, 2 * _LEVEL, "".join(shapes), tuple(dimensions), at="drive")
 
 
 def _line(start: float, end: float) -> str:

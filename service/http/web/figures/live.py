@@ -74,6 +74,17 @@ def along(studies: Sequence[tuple[str, Study]], result: str) -> dict[str, tuple[
     return found
 
 
+def values_of_result(studies: Sequence[tuple[str, Study]], result: str) -> dict[str, float]:
+    """A result of each study of one machine that has it. For the computing process."""
+    values = {}
+    for name, study in studies:
+        rows = models.run_chunk(study, 0, 1)
+        place = [info.name for info in models.study_results(study)].index(result)
+        if rows.endings[0] == models.OK and np.isfinite(rows.values[0, place]):
+            values[name] = float(rows.values[0, place])
+    return values
+
+
 def frames(motion: Trajectory, frequency: float) -> dict[str, Any]:
     """Positions of the parts of a drive, evenly over its motion: pixels of the base, degrees of what turns; ``periods``
     is the number of excitation periods from the first to the last frame.

@@ -10,7 +10,7 @@ from urllib.parse import urlencode
 from sprag.sentences import Place, WarningText
 from sprag.service.faults import Fault
 from sprag.service.figures.drawing import Drawing
-from sprag.service.figures.drawings import drawings
+from sprag.service.figures.drawings import BETWEEN_FIELDS, drawings
 from sprag.service.http.web.figures.fits import FitChart, fit_at
 from sprag.service.http.web.form.columns import COLUMNS
 from sprag.service.http.web.form.entries import Faults, items_of, list_of, range_of
@@ -172,7 +172,7 @@ def check_form(
         found.parsed = None
     if found.parsed is not None:
         found.preview = preview_json(found.parsed, chunking, known(found.parsed.study), left)
-        found.sketch = drawings(found.parsed.study)
+        found.sketch = drawings(found.parsed.study, width=BETWEEN_FIELDS)
     found.notes += _points(values)
     for pointer in places(values, "measured"):
         found.notes += _assumed(values.get(f"{pointer}/data", ""))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import re
+from contextlib import suppress
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from fastapi import Query
@@ -15,10 +16,10 @@ from sprag.service.http.problems import ApiError
 from sprag.service.http.respond import json_response
 from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
-from sprag.service.http.web.figures.live import along, live_case
+from sprag.service.http.web.figures.live import along, live_case, values_of_result
 from sprag.service.http.web.form.beginning import beginning
 from sprag.service.http.web.form.entries import Values, plain
-from sprag.service.http.web.form.machine import choices_of, entries, form_of, model_name, row_of
+from sprag.service.http.web.form.machine import BASE, choices_of, entries, form_of, model_name, row_of
 from sprag.service.http.web.form.machine_spec import base_of
 from sprag.service.http.web.form.own_machine import single_machine
 from sprag.service.http.web.form.sent import ends_of, settle
@@ -85,6 +86,19 @@ def studies_along(values: Mapping[str, str], spec: Mapping[str, Any]) -> list[tu
     return found
 
 
+def studies_without(values: Mapping[str, str], spec: Mapping[str, Any]) -> list[tuple[str, Study]]:
+    """By the pointer of each part of a machine of several parts, a study of the machine without it."""
+    studies = []
+    for rows in form_of(values).lists:
+        parts = spec["base"].get(rows.at, ()) if rows.alone else ()
+        for index in range(len(parts)) if len(parts) > 1 else ():
+            others = [{} if other == index else part for other, part in enumerate(parts)]
+            with suppress(SpecError):  # such as a formula that has a number of the part
+                study = parse_spec({**spec, "base": {**spec["base"], rows.at: others}, "axes": []}).study
+                studies.append((f"{BASE}/{rows.at}/{index}", study))
+    return studies
+
+
 async def live_answer(work: Work, values: Values, width: int = _WIDTH) -> dict[str, Any] | None:
     """The answer to a form: its text with the picture, and the frames of the drawing; None while it has faults."""
     drawn = await work.check(drawn_machine, values)
@@ -127,29 +141,38 @@ async def live(work: Attended, values: Form, width: Annotated[int, Query(ge=240,
 
 @router.post("/new/along")
 async def curves_along(work: Attended, values: Form) -> Response:
-    """Thumbnails of the main result along each number, where the model is computed at once."""
+    """Thumbnails of the main result along each number, and its value without each part of the machine, where the model
+    is computed at once.
+    """
     settle(values)
     result = models.model_of(model_name(values)).presentation.laboratory.along
     drawn = await work.check(drawn_machine, values) if result else None
     if drawn is None:
         return json_response({"sparks": {}})
     studies = await work.check(studies_along, values, drawn[1])
-    found = await work.run_case(_along, drawn[0], studies, result)
+    without = await work.check(studies_without, values, drawn[1])
+    found, alone = await work.run_case(_along, drawn[0], studies, without, result)
     reading = reading_for(drawn[0], drawn[1], current().choice)
     label = models.presentation_of(drawn[0]).laboratory.main.get(result) or result
     info = next(info for info in models.study_results(drawn[0]) if info.name == result)
 
     def made() -> dict[str, str]:
-        return {
+        sparks: dict[str, str] = {
             name: fragment("_spark.html", curve=curve, ends=ends, info=info, reading=reading, label=label)
             for name, (curve, *ends) in found.items()
+        }
+        return sparks | {
+            part: fragment("_without.html", value=value, info=info, reading=reading, label=label)
+            for part, value in alone.items()
         }
 
     return json_response({"sparks": await in_thread(made)})
 
 
-def _along(_study: Study, studies: list[tuple[str, Study]], result: str) -> dict[str, tuple[str, float, float]]:
-    return along(studies, result)
+def _along(
+    _study: Study, studies: list[tuple[str, Study]], without: list[tuple[str, Study]], result: str
+) -> tuple[dict[str, tuple[str, float, float]], dict[str, float]]:
+    return along(studies, result), values_of_result(without, result)
 
 
 def _read_ahead() -> None:
@@ -174,7 +197,7 @@ async def warm(context: Context) -> None:
                 await context.computer.run(live_case, study, reading_for(study, spec, current().choice), _WIDTH)
                 if result := models.presentation_of(study).laboratory.along:
                     first = (await context.checker.run(studies_along, values, spec))[:1]
-                    await context.computer.run(_along, study, first, result)
+                    await context.computer.run(_along, study, first, [], result)
     except (ApiError, JobStoppedError, NotCompiledError) as error:
         _LOG.info("The first machines are not computed ahead: %s", error)
 

@@ -69,6 +69,23 @@ class Entry:
             return "tick"
         return "select" if self.field.choices else "lines" if self.item.lines else "line"
 
+    @property
+    def kind_of(self) -> str:
+        """Pointer of the object whose kind it says, so that the same names mean something else with another; "" for
+        none.
+        """
+        if isinstance(self.item, data.FormChoice):
+            at = next((option.at for option in self.item.options if option.is_kind), "")
+            return f"{self.place}/{at}" if at else ""
+        return self.pointer if self.field.choices and self.name.endswith("/kind") else ""
+
+    @property
+    def kinds(self) -> set[str]:
+        """Of `kind_of`, the values that are kinds of that object."""
+        if isinstance(self.item, data.FormChoice):
+            return {option.value for option in self.item.options if option.is_kind}
+        return {value for value, _label in self.field.choices}
+
     def chosen(self, values: Mapping[str, str]) -> str:
         """The value of a choice, by default the first one."""
         known = [value for value, _label in self.field.choices]
@@ -85,7 +102,8 @@ class Block:
     """Fields under one heading.
 
     ``within`` are the blocks that continue it; ``drop`` is the list and the row that a button removes, ``adds`` the
-    list to which one adds in it, ``ends`` the one that ends with it.
+    list to which one adds in it, ``ends`` the one that ends with it. ``part`` is the pointer of the part of the machine
+    that it belongs to, in which it is called ``heading``; "" where the machine has no parts.
     """
 
     title: str
@@ -94,6 +112,8 @@ class Block:
     drop: tuple[str, int] | None = None
     adds: str = ""
     ends: str = ""
+    part: str = ""
+    heading: str = ""
 
 
 def model_name(values: Mapping[str, str]) -> str:
@@ -170,6 +190,7 @@ class _Machine:
             for block in rows.blocks:
                 if block.only is None or self.values.get(f"{BASE}/{block.only[0]}") == block.only[1]:
                     own = self._block(block, place, () if made else rows.fields)
+                    own = replace(own, part=place if rows.alone else "", heading=block.title)
                     title = _(rows.title, number=index + rows.first, label=_(block.title).lower())
                     if block.within:
                         made[-1] = replace(made[-1], within=(*made[-1].within, own))

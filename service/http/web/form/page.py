@@ -47,7 +47,7 @@ from sprag.service.http.web.form.machine_spec import base_of, values_of_base
 from sprag.service.http.web.form.own_machine import own_spec
 from sprag.service.http.web.form.parts import count_of, parts_of, reshape, share, unshared
 from sprag.service.http.web.form.rows import LIMITS
-from sprag.service.http.web.form.sent import let_vary, settle
+from sprag.service.http.web.form.sent import changed_kinds, let_vary, settle
 from sprag.service.http.web.form.sheet import Sheet, preferred, sheet_of
 from sprag.service.http.web.form.spec import REFINE_DEFAULTS, is_search, values_of
 from sprag.service.http.web.form.tolerances import BATCH, OWN, distributions, drive_fields, own_name, with_batch
@@ -210,9 +210,9 @@ async def send_form(context: Ctx, work: Attended, request: Request, values: Form
         undo(values)
         settle(values, with_ticks=False)
         return await in_thread(form_page, request, values, await look_over(context, work, values))
-    before = values
+    before, kinds = values, changed_kinds(values)
     if "/text" not in values:
-        before = unshared(_without_ticks(values))
+        before = unshared(_without_ticks(values | kinds))
         _settle(values)
         share(values)
     if wanted == "submit":
@@ -221,13 +221,22 @@ async def send_form(context: Ctx, work: Attended, request: Request, values: Form
     reshape(values, wanted)
     if wanted == "take-component":
         take_component(values, await in_thread(context.store.components.all))
+    opened = _opened(values, wanted, kinds)
     taken = wanted == "take-columns"
     faults = await in_thread(take_columns, values, _choices(values)) if taken else {}
     remember(values, before)
     checked = await look_over(context, work, values)
     checked.faults.update(faults)
     shown = await live_answer(work, values) if wanted == "live" else None
-    return await in_thread(form_page, request, values, checked, live=None if shown is None else shown["answer"])
+    answer = None if shown is None else shown["answer"]
+    return await in_thread(form_page, request, values, checked, live=answer, opened=opened)
+
+
+def _opened(values: Values, wanted: str, kinds: Mapping[str, str]) -> str:
+    """A field of the part of the machine that was added or has another kind; "" for none."""
+    name = wanted.removeprefix("add-")
+    part = parts_of(values).get(name) if name != wanted else None
+    return next(iter(kinds), "") if part is None else f"{part.pointer}/{count_of(values, name) - 1}/"
 
 
 def _submit(context: Context, request: Request, values: Values, checked: Checked, made: Submission | None) -> Response:
@@ -259,7 +268,7 @@ async def check(context: Ctx, work: Attended, request: Request, values: Form) ->
             "beside": checked.beside,
             "run": checked.run,
             "panel": fragment("_form_panel.html", checked=checked, address=_address(request)),
-            "pictures": [] if "/text" in values else [plan.picture for plan in _sheet(request, values, checked).plans],
+            "pictures": [] if "/text" in values else _sheet(request, values, checked).pictures,
             "fits": {
                 pointer: fragment("_form_fit.html", fit=fit, chart=chart, pointer="")
                 for pointer, (fit, chart) in checked.fits.items()
@@ -282,25 +291,27 @@ def form_page(
     *,
     fields: bool = True,
     live: str | None = None,
+    opened: str = "",
 ) -> Response:
     """The page with the form filled in with ``values``; ``checked`` is None where they were not checked.
 
-    ``fields`` is False where the form has no fields for the study, so that its spec is shown as text.
+    ``fields`` is False where the form has no fields for the study, so that its spec is shown as text; ``opened`` is a
+    field of the part of the machine that is open.
     """
     template = "new_text.html" if "/text" in values else "new.html"
-    return page(template, status=status, with_fields=fields, live=live, **sheet_form(request, values, checked))
+    return page(template, status=status, with_fields=fields, live=live, **sheet_form(request, values, checked, opened))
 
 
-def sheet_form(request: Request, values: Values, checked: Checked | None) -> dict[str, Any]:
+def sheet_form(request: Request, values: Values, checked: Checked | None, opened: str = "") -> dict[str, Any]:
     """What the templates of a form are filled with, also those of its parts: ``_machine.html``, ``_varies.html`` and
-    ``_drawer.html``, beside the macros of ``_fields.html`` imported with their context.
+    ``_drawer.html``, beside the macros of ``_fields.html`` imported with their context; ``opened`` as of `form_page`.
     """
     begun, checked = checked is not None, checked or Checked({})
     text_mode, model, own = "/text" in values, model_name(values), form_of(values)
     reading = _reading(values)
     values = values if text_mode else with_own_units(values, reading)
     parts = parts_of(values)
-    sheet = None if text_mode else _sheet(request, values, checked)
+    sheet = None if text_mode else _sheet(request, values, checked, opened)
     rows = {} if text_mode else {name: range(count_of(values, name)) for name in parts}
 
     def results(*, numbers: bool = False) -> Groups:
@@ -355,7 +366,7 @@ def _settle(values: Values) -> None:
     with_shown_units(values, _reading(values))
 
 
-def _sheet(request: Request, values: Values, checked: Checked) -> Sheet:
+def _sheet(request: Request, values: Values, checked: Checked, opened: str = "") -> Sheet:
     """The sheet of a form; a machine that has faults is drawn as far as its numbers are known."""
     model, before = model_name(values), None
     if source := values.get("from"):
@@ -372,6 +383,7 @@ def _sheet(request: Request, values: Values, checked: Checked) -> Sheet:
         faulty=checked.faults,
         before=before,
         begun=_begun(model),
+        wanted=opened,
     )
 
 

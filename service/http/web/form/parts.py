@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from sprag.service.http.web.form.entries import Values, count_in
-from sprag.service.http.web.form.machine import BASE, form_of
+from sprag.service.http.web.form.machine import BASE, entries, form_of
 from sprag.service.http.web.form.tolerances import OWN
 from sprag.service.reading.numbers import whole_number
 from sprag.service.spec.kinds.goal import GOAL
@@ -88,8 +88,13 @@ def _add_row(values: Values, name: str, part: Part) -> None:
     if count < part.most:
         values |= {f"{part.pointer}/{count}/{entry}": text for entry, text in part.new.items()}
         if rows is not None and rows.copies:
-            for pointer in _with_tolerances(part.pointer):
+            counts = {entry.name for entry in entries(values | {name: str(count)}, hidden=True)}
+            for pointer in with_tolerances(part.pointer):
                 _copy_row(values, pointer, count - 1, count)
+            # What is kept of other choices of that row is not copied.
+            for own in [own for own in values if own.startswith(f"{part.pointer}/{count}/")]:
+                if own.replace(f"/{count}/", f"/{count - 1}/", 1) not in counts:
+                    del values[own]
         values[name] = str(count + 1)
 
 
@@ -97,7 +102,7 @@ def _enclose(values: Values, rows: Rows) -> None:
     """Make what stands alone the first row of its list; paths that vary or are in formulas follow."""
     for root in dict.fromkeys(item.name.partition("/")[0] for block in rows.blocks for item in block.items):
         inside = f"{rows.at}/0/{root}"
-        for old in _with_tolerances(f"{BASE}/{root}"):
+        for old in with_tolerances(f"{BASE}/{root}"):
             copy(values, old, old.replace(root, inside, 1))
             drop(values, old)
         for name, text in values.items():
@@ -153,14 +158,14 @@ def _drop_row(values: Values, name: str, part: Part, index: int) -> None:
     count = count_of(values, name)
     if index >= count or (part.rows is not None and count <= part.rows.least):
         return
-    for pointer in _with_tolerances(part.pointer):
+    for pointer in with_tolerances(part.pointer):
         for row in range(index, count):
             drop(values, f"{pointer}/{row}/")
             _copy_row(values, pointer, row + 1, row)
     values[name] = str(count - 1)
 
 
-def _with_tolerances(pointer: str) -> tuple[str, ...]:
+def with_tolerances(pointer: str) -> tuple[str, ...]:
     """The beginning of names of fields, and that of the fields of their tolerances."""
     return (pointer, pointer.replace("/base/", OWN, 1)) if pointer.startswith("/base/") else (pointer,)
 

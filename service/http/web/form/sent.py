@@ -10,12 +10,13 @@ from collections.abc import Mapping
 from typing import Final
 
 from sprag.service.http.web.form.entries import Values, names_of
-from sprag.service.http.web.form.machine import BASE, model_name, row_of
-from sprag.service.http.web.form.parts import PARTS, count_of, reshape
+from sprag.service.http.web.form.machine import BASE, entries, form_of, model_name, row_of
+from sprag.service.http.web.form.parts import PARTS, count_of, drop, reshape, with_tolerances
 from sprag.service.http.web.form.spec import is_search
 from sprag.service.reading.quantities import is_si
 from sprag.service.reading.units import QuantityError, split_quantity
 from sprag.worker import models
+from sprag.worker.models.form import FormChoice, Rows
 
 #: Beginnings of the names of a unit beside a number, of the tick at a number that varies, of the one at numbers that
 #: vary alike and of those that it is about; of the numbers that have a tick, by the list of what varies.
@@ -24,6 +25,8 @@ VARY: Final = "vary:"
 ALIKE: Final = "alike:"
 ALIKES: Final = "alikes:"
 TICKS: Final = "ticks:"
+#: Of the kind that a choice had when the page was made: other kinds have other meanings of the same fields.
+KIND: Final = "kind:"
 #: Numbers of a row that have the row's unit.
 IN_ROW: Final = ("from", "to", "step", "values", "value")
 _BARE: Final = re.compile(r"[-+\d.,;\seE\u00a0\u202f\u2212'’]*\d[-+\d.,;\seE\u00a0\u202f\u2212'’]*")
@@ -32,7 +35,14 @@ _VALUES: Final = "9"
 
 
 def settle(values: Values, *, with_ticks: bool = True) -> None:
-    """Read units and ticks into the fields that they are about; without ticks only take them away."""
+    """Read units and ticks into the fields that they are about, and empty those whose meaning another kind has changed;
+    without ticks only take them away.
+    """
+    kinds = changed_kinds(values)
+    for name in [name for name in values if name.startswith(KIND)]:
+        del values[name]
+    if with_ticks and kinds:
+        _empty(values, kinds)
     for name in [name for name in values if name.startswith(UNIT)]:
         unit, field = values.pop(name), name.removeprefix(UNIT)
         for own in (field, *(f"{field}/{part}" for part in IN_ROW)):
@@ -52,6 +62,42 @@ def settle(values: Values, *, with_ticks: bool = True) -> None:
         for path in paths:
             if path not in changed:
                 _vary(values, part, path, wanted=path in varying)
+
+
+def changed_kinds(values: Mapping[str, str]) -> Values:
+    """The choices that have another value than when the page was made, and their value then."""
+    shown = {name.removeprefix(KIND): text for name, text in values.items() if name.startswith(KIND)}
+    return {name: text for name, text in shown.items() if values.get(name, text) != text}
+
+
+def _empty(values: Values, kinds: Mapping[str, str]) -> None:
+    """Empty the object of each changed kind, and what a part with another mechanism has only as a copy of the part
+    before it.
+    """
+    for entry in [entry for entry in entries(values, hidden=True) if entry.name in kinds]:
+        wanted = values[entry.name]
+        if entry.kind_of and {wanted, kinds[entry.name]} <= entry.kinds:
+            for pointer in with_tolerances(entry.kind_of):
+                drop(values, f"{pointer}/")
+            values[entry.name] = wanted
+        for rows in form_of(values).lists:
+            _empty_copy(values, rows, entry.name)
+
+
+def _empty_copy(values: Values, rows: Rows, name: str) -> None:
+    """Empty the other choices of a row that are as in the row before it, where the first choice of the row changed."""
+    choices = (item.name for block in rows.blocks for item in block.items if isinstance(item, FormChoice))
+    first, *others = [*choices] or [""]
+    found = re.fullmatch(rf"({BASE}/{rows.at})/(\d+)/{first}", name) if rows.alone and first else None
+    if found is None or found[2] == "0":
+        return
+    for other in others:
+        own, before = (f"{found[1]}/{row}/{other}" for row in (int(found[2]), int(found[2]) - 1))
+        texts = [{key.removeprefix(at): text for key, text in values.items() if key == at or key.startswith(f"{at}/")}
+                 for at in (own, before)]  # fmt: skip
+        if all(texts[1].get(key, "") == text for key, text in texts[0].items()):
+            for pointer in with_tolerances(own):
+                drop(values, pointer)
 
 
 def with_unit(text: str, unit: str) -> str:

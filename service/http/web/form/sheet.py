@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 from markupsafe import Markup
 
-from sprag.service.figures.drawing import Drawing, rows_of, svg, with_leaders
+from sprag.service.figures.drawing import Dimension, Drawing, Side, balanced, rows_of, svg, with_leaders
+from sprag.service.figures.drawings import BETWEEN_FIELDS
+from sprag.service.figures.painter.elements import text_width
 from sprag.service.http.web.form.entries import Values, names_of, plain
 from sprag.service.http.web.form.machine import BASE, Block, Entry, blocks, form_of, model_name
 from sprag.service.http.web.form.parts import PARTS, count_of
@@ -17,17 +19,25 @@ from sprag.service.http.web.form.sent import IN_ROW, part_of, varied
 from sprag.service.languages import _
 from sprag.service.reading.cyrillic import latin
 from sprag.service.reading.numbers import parse_number
+from sprag.service.reading.part_names import lower_first
 from sprag.service.reading.quantities import SI, offered, read_units, workshop_units
 from sprag.service.reading.reader import Reading
 from sprag.service.reading.together import with_last_unit
 from sprag.service.reading.units import QuantityError, parse_quantity, plain_signs
+from sprag.service.reading.wording import number, unit_text
+from sprag.worker.models.form import FormChoice
 from sprag.worker.models.parameters import model_parameter
 
 if TYPE_CHECKING:
     from sprag.service.http.web.form.fields import Groups
 
-#: A drawing at most so wide has its fields at both sides, so far apart from each other and from the drawing (px).
-_NARROW, _STEP, _STEP_TOLERANT, _GAP, _AT = 200.0, 76.0, 104.0, 14.0, 36.0
+#: Fields at both sides of a drawing: their distance from it and from each other, the latter also of a mechanism, what
+#: tolerances and a label of two lines add to it, and the place of a line's end in a field (px).
+_GAP, _STEP, _STEP_MECHANISM, _TOLERANT, _LINE, _AT = 8.0, 76.0, 84.0, 28.0, 16.0, 36.0
+#: Size of a label, and its room without and with the tick of a number that can vary (px).
+_SIZE, _ROOM, _ROOM_VARY = 12.2, 140.0, 90.0
+#: Beginning of the name of the fields at both sides of a drawing, so that they stay where they are.
+_SIDES: Final = "sides:"
 _NUMBER: Final = re.compile(r"\s*([-+\u2212]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?)\s*(.*)", re.DOTALL)
 _LONGEST: Final = 9
 #: Controls that leave the drawer where they differ from the example.
@@ -81,12 +91,44 @@ class Spot:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """A drawing with the numbers whose fields stand at its sides."""
+    """A drawing with the numbers whose fields stand at its sides.
+
+    Attributes
+    ----------
+    left, right : those numbers; ``tall`` where one of their labels takes two lines
+    sides : name and value of the field that keeps them at their sides
+    name : of the choice of the part that is drawn; "" for the whole machine
+    """
 
     drawing: Drawing
     picture: Markup
     left: tuple[Spot, ...] = ()
     right: tuple[Spot, ...] = ()
+    tall: bool = False
+    sides: tuple[str, str] = ("", "")
+
+    @property
+    def name(self) -> str:
+        """Name of the choice of the part that is drawn; "" for the whole machine."""
+        return f"{BASE}/{self.drawing.at.replace('.', '/')}" if self.drawing.at else ""
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Blocks that are one part of the machine, behind a line that says what it is, or a block that is always in sight.
+
+    Attributes
+    ----------
+    part : pointer of the part; "" for none
+    title, line : of the part, and what it is and what varies in it
+    opened : whether it is open
+    """
+
+    blocks: tuple[Block, ...]
+    part: str = ""
+    title: str = ""
+    line: str = ""
+    opened: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,12 +159,23 @@ class Sheet:
 
     plans: tuple[Plan, ...]
     blocks: tuple[Block, ...]
+    groups: tuple[Group, ...]
     spots: Mapping[str, Spot]
     placed: frozenset[str]
     front: frozenset[str]
     rows: tuple[Row, ...]
     ticks: str
     opened: bool
+
+    def drawn(self, block: Block | None = None) -> tuple[Plan, ...]:
+        """The drawings of a block, or those of the whole machine."""
+        names = {""} if block is None else {entry.name for entry in block.entries}
+        return tuple(plan for plan in self.plans if plan.name in names)
+
+    @property
+    def pictures(self) -> list[Markup]:
+        """The drawings in the order of the page."""
+        return [plan.picture for block in (None, *self.blocks) for plan in self.drawn(block)]
 
     def shown(self, block: Block, *, front: bool) -> tuple[Entry, ...]:
         """The fields of a block in sight, or in the drawer."""
@@ -140,6 +193,7 @@ def sheet_of(
     faulty: Iterable[str] = (),
     before: Values | None = None,
     begun: Values | None = None,
+    wanted: str = "",
 ) -> Sheet:
     """The sheet of a form.
 
@@ -152,6 +206,7 @@ def sheet_of(
     faulty : fields that something is wrong with
     before : the form of the study of which this one is a variant
     begun : the form with which an empty one begins
+    wanted : a field of the part of the machine that is open
     """
     made = _Making(
         values,
@@ -161,7 +216,9 @@ def sheet_of(
     )
     every, form = blocks(values), form_of(values)
     found = [entry for block in every for own in (block, *block.within) for entry in _all(own.entries)]
-    repeated = {entry.field.label for entry in found if sum(own.field.label == entry.field.label for own in found) > 1}
+    labels = [entry.field.label for block in every if not block.part for own in (block, *block.within)
+              for entry in _all(own.entries)]  # fmt: skip
+    repeated = {label for label in labels if labels.count(label) > 1}
     spots = {entry.name: made.spot(entry, repeated) for entry in found if entry.control == "line"}
     alone = {entry.name for block in every for own in (block, *block.within) for entry in own.entries}
     front = frozenset(
@@ -169,15 +226,11 @@ def sheet_of(
         or (entry.name in alone and entry.control in _MOVED and _differs(values, begun, (entry,)))
     )  # fmt: skip
     by_path = {spot.path: spot for spot in spots.values() if spot.name in front}
-    plans, placed = [], set[str]()
-    step = _STEP_TOLERANT if tolerant else _STEP
-    for drawing in drawings:
-        narrow = drawing.width <= _NARROW and not drawing.frames
-        sides = [tuple(by_path[own.path] for own in rows_of(drawing, side) if narrow and own.path in by_path)
-                 for side in ("left", "right")]  # fmt: skip
-        placed |= {spot.name for side in sides for spot in side}
-        text = with_leaders(drawing, step, _GAP, _AT) if narrow else svg(drawing)
-        plans.append(Plan(drawing, Markup(text), *sides))  # noqa: S704 - its texts are escaped where it is made
+    links = {spot.path: f"#{name}" for name, spot in spots.items()}
+    plans = [_plan(drawing, by_path, links, values, tolerant=tolerant) for drawing in drawings]
+    placed = frozenset(spot.name for plan in plans for spot in (*plan.left, *plan.right))
+    faulty = frozenset(faulty)
+    groups = tuple(_groups(every, spots, values, faulty, wanted))
     inside = {entry.name for entry in found} - front
     opened = (
         any(name in inside for name in faulty)
@@ -185,9 +238,84 @@ def sheet_of(
         or any(values.get(name) != text for name, text in (begun or {}).items() if name.startswith("/run/"))
     )
     return Sheet(
-        tuple(plans), tuple(every), spots, frozenset(placed), front, tuple(made.rows()),
+        tuple(plans), tuple(every), groups, spots, placed, front, tuple(made.rows()),
         " ".join(spot.path for spot in spots.values() if spot.may_vary), opened,
     )  # fmt: skip
+
+
+def _plan(
+    drawing: Drawing, by_path: Mapping[str, Spot], links: Mapping[str, str], values: Mapping[str, str], *,
+    tolerant: bool,
+) -> Plan:  # fmt: skip
+    """A drawing with the fields of its numbers in sight at both sides, where there is room."""
+    own = {each.path: each for each in drawing.dimensions if each.path in by_path}
+    if not own or (drawing.at and not drawing.frames):
+        return Plan(drawing, Markup(svg(drawing, links=links)))  # noqa: S704 - its texts are escaped where it is made
+    rows = balanced(tuple(own.values())) if drawing.at else tuple(
+        tuple(each for each in rows_of(drawing, side) if each.path in own) for side in ("left", "right")
+    )  # fmt: skip
+    name = f"{_SIDES}{drawing.at}"
+    before = [names_of(text) for text in values.get(name, "").split(";")]
+    if sorted(path for side in before for path in side) == sorted(own):
+        rows = tuple(tuple(own[path] for path in side) for side in before)
+    sided: dict[str, Side] = dict.fromkeys((each.path for each in rows[0]), "left")
+    sided |= dict.fromkeys((each.path for each in rows[1]), "right")
+    drawing = replace(drawing, dimensions=tuple(
+        replace(each, side=sided.get(each.path, each.side)) for each in drawing.dimensions
+    ))  # fmt: skip
+    left, right = (tuple(by_path[each.path] for each in side) for side in rows)
+    tall = any(text_width(f"{spot.label} {spot.entry.field.symbol}", _SIZE) > (_ROOM_VARY if spot.may_vary else _ROOM)
+               for spot in (*left, *right))  # fmt: skip
+    more = _LINE if tall else 0.0
+    step = (_STEP_MECHANISM if drawing.at else _STEP) + (_TOLERANT if tolerant else 0.0) + more
+    gap = _GAP + (max(BETWEEN_FIELDS - drawing.width, 0.0) / 2 if drawing.at else 0.0)
+    picture = Markup(with_leaders(drawing, step, gap, _AT + more, rows, links))  # noqa: S704 - as above
+    return Plan(drawing, picture, left, right, tall, (name, ";".join(map(_paths, rows))))
+
+
+def _paths(dimensions: Iterable[Dimension]) -> str:
+    return " ".join(each.path for each in dimensions)
+
+
+def _groups(
+    every: Sequence[Block], spots: Mapping[str, Spot], values: Mapping[str, str], faulty: frozenset[str], wanted: str
+) -> Iterable[Group]:
+    """Blocks by part of the machine. Open are the parts with something wrong or wanted, or the first one."""
+    parts = list(dict.fromkeys(block.part for block in every if block.part))
+    opened = {part for part in parts if any(f"{name}/".startswith(f"{part}/") for name in (*faulty, wanted))}
+    seen = set[str]()
+    for block in every:
+        if not block.part:
+            yield Group((block,))
+        elif block.part not in seen:
+            seen.add(block.part)
+            own = tuple(each for each in every if each.part == block.part)
+            shown = block.part in (opened or parts[:1])
+            yield Group(own, block.part, *_described(own, spots, values), shown)
+
+
+def _described(blocks: Sequence[Block], spots: Mapping[str, Spot], values: Mapping[str, str]) -> tuple[str, str]:
+    """Title of a part, by its first choice, and a line of its other choices and of what varies in it."""
+    chosen = {entry.field.label: _(dict(entry.field.choices)[entry.chosen(values)]) for block in blocks
+              for entry in block.entries if isinstance(entry.item, FormChoice)}  # fmt: skip
+    kind, *others = chosen.items()
+    at, _slash, index = blocks[0].part.rpartition("/")
+    rows = next(rows for rows in form_of(values).lists if at == f"{BASE}/{rows.at}")
+    title = _(rows.title, number=int(index) + rows.first, label=lower_first(kind[1]))
+    before = [spots[entry.name] for entry in blocks[0].entries if entry.item in rows.fields]
+    texts = [f"{lower_first(_(label))}: {lower_first(text)}" for label, text in others]
+    texts += [f"{lower_first(spot.label)} {_numeral(spot.quantity.texts[0])} {unit_text(spot.quantity.unit)}"
+              for spot in before if spot.quantity.texts[0] and spot.row is None]  # fmt: skip
+    varying = [spots[entry.name] for block in blocks for entry in _all(block.entries)
+               if entry.name in spots and spots[entry.name].row is not None]  # fmt: skip
+    texts += [_("{label} varies", label=lower_first(spot.label)) for spot in varying]
+    return title, ", ".join(texts)
+
+
+def _numeral(text: str) -> str:
+    """The text of a field as it is printed, where it is a number."""
+    value = parse_number(text)
+    return text if value is None else number(value, _LONGEST)
 
 
 def _differs(values: Mapping[str, str], begun: Values | None, entries: Iterable[Entry]) -> bool:

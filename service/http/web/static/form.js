@@ -36,6 +36,9 @@ const fail = (text) => {
   panel.prepend(note);
 };
 
+// Open the parts of the form that something is in.
+const reveal = (element) => { for (let part = element; (part = part.parentElement?.closest("details"));) part.open = true; };
+
 const check = async () => {
   const mine = ++latest, panel = document.getElementById("panel");
   old = true;
@@ -59,7 +62,10 @@ const check = async () => {
     const told = whole || touched.has(name) || !field || field.value !== "";
     const messages = told ? found.faults[name] || [] : [];
     const text = messages.join(name === "/text" ? "\n" : ". ");
-    if (place.textContent !== text) place.textContent = text;
+    if (place.textContent !== text) {
+      place.textContent = text;
+      if (text) reveal(place);
+    }
     if (field) field.toggleAttribute("aria-invalid", messages.length > 0);
     if (field && messages.length) field.setAttribute("aria-invalid", "true");
   }
@@ -135,8 +141,9 @@ const newShape = async (extra, body = encoded(extra)) => {
   if (!fresh) { fail(page.querySelector("main p")?.textContent || sprag.refusal(answer)); return false; }
   const known = new Set([...form.elements].map((element) => element.id || element.value));
   const { name: chosen, type } = document.activeElement;
-  const named = (part) => `${part.closest("fieldset[id]")?.id} ${part.querySelector("summary").textContent}`;
-  const opened = new Set([...form.querySelectorAll("details[open]")].map(named));
+  const named = (part) => part.id || `${part.closest("fieldset[id]")?.id} ${part.querySelector("summary").textContent}`;
+  const added = [...fresh.querySelectorAll(".fold")].some((part) => !document.getElementById(part.id)); // which alone is open
+  const opened = new Set([...form.querySelectorAll(`details[open]${added ? ":not(.fold)" : ""}`)].map(named));
   const live = document.getElementById("live");
   if (live) fresh.querySelector("#live")?.replaceWith(live); // until it is computed for the new form
   form.replaceWith(document.adoptNode(fresh));
@@ -262,13 +269,20 @@ if (refused) {
   refused.scrollIntoView({ block: "center" });
 }
 listen();
-// An address that has the name of a field leads into it.
-const asked = document.getElementById(decodeURIComponent(location.hash.slice(1)));
-if (asked && form.contains(asked) && !refused) {
-  asked.closest("details")?.setAttribute("open", "");
+// An address that has the name of a field leads into it, and so does a letter of a drawing.
+const lead = (address) => {
+  const asked = document.getElementById(decodeURIComponent(address.slice(1)));
+  if (!asked || !form.contains(asked)) return false;
+  reveal(asked);
   asked.focus();
   asked.select?.();
-}
+  return true;
+};
+if (!refused) lead(location.hash);
+document.addEventListener("click", (event) => {
+  const link = event.target.closest?.("#study-form a[href^='#/']");
+  if (link && lead(link.getAttribute("href"))) event.preventDefault();
+});
 if ("unchecked" in form.dataset) check();
 const draft = sprag.drafts.waiting(form, Boolean(refused));
 if (draft) sprag.drafts.offer(form, draft, (fields) => newShape([], new URLSearchParams(fields)));

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from playwright.sync_api import expect
 
+from sprag.service.figures.drawings import BETWEEN_FIELDS, drawings
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.form.check import check_form
-from sprag.service.http.web.form.machine import Entry, entries
+from sprag.service.http.web.form.machine import Entry, choices_of, entries
 from sprag.service.http.web.form.machine_spec import base_of, values_of_base
 from sprag.service.http.web.form.page import empty
+from sprag.service.http.web.form.parts import reshape
+from sprag.service.http.web.form.sheet import sheet_of
 from sprag.service.http.web.form.spec import spec_of, values_of
 from sprag.service.http.web.form.undo import history_of
 from sprag.service.presets import preset_names
@@ -21,9 +26,13 @@ from sprag.service.spec.document import parse_spec
 from sprag.worker import models
 from sprag.worker.chunking import Chunking
 from tests.acceptance.processes import EXAMPLES
+from tests.service.http.web.controls import Controls
 
 if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
     from tests.service.conftest import Service
+    from tests.service.http.web.conftest import Visitor
 
 #: Texts of fields by how they are read; of all others a number.
 TEXTS = {
@@ -114,3 +123,119 @@ def test_measured_rows_are_taken_over_as_they_were_typed() -> None:
     spec["base"]["pendulums"][0]["clutch"]["data"][0][0] = 0.004
     text = values_of(spec)["/base/pendulums/0/clutch/data"]
     assert text.splitlines()[:2] == ["angle_rad\ttorque [N*mm]", "0.004\t878"]
+
+
+def _controls(service: Service, address: str) -> dict[str, str]:
+    return Controls(service.http.get(address).text).values
+
+
+def _parts(page: str) -> list[tuple[str, bool]]:
+    """Titles of the parts of a machine in a form, and whether each is open."""
+    found = re.findall(r'<details class="fold" id="[^"]*"( open)?><summary><b>([^<]*)</b>', page)
+    return [(title, bool(opened)) for opened, title in found]
+
+
+def test_each_part_says_what_it_is_and_the_one_with_a_fault_is_open(service: Service) -> None:
+    page = service.http.get("/new?preset=two_cylinder_compressor").text
+    assert _parts(page) == [("Part 1: slider crank", True), ("Part 2: slider crank", False)]
+    assert "resistance: gas in a compressor, crank angle varies" in page
+    shown = Controls(page).values
+    crank = "/base/parts/1/mechanism/slider_crank/crank"
+    page = service.http.post("/new", data={**shown, crank: "40 kg", "do": "check"}).text
+    assert [opened for _title, opened in _parts(page)] == [False, True]
+
+
+def test_an_added_part_is_open_and_begins_empty_when_its_mechanism_changes(service: Service) -> None:
+    sent = {**_controls(service, "/new?preset=two_cylinder_compressor"), "do": "add-parts"}
+    page = service.http.post("/new", data=sent).text
+    assert [opened for _title, opened in _parts(page)] == [False, False, True]
+    shown, part = Controls(page).values, "/base/parts/2"
+    assert shown[f"{part}/operation"] == "gas"
+    page = service.http.post("/new", data={**shown, f"{part}/mechanism": "scotch_yoke", "do": "check"}).text
+    changed = Controls(page).values
+    assert _parts(page)[2] == ("Part 3: scotch yoke", True)
+    assert changed[f"{part}/operation"] == "none"
+    assert not any(text for name, text in changed.items() if name.startswith(f"{part}/mechanism/scotch_yoke/"))
+    undone = Controls(service.http.post("/new", data={**changed, "do": "undo"}).text).values
+    assert {name: text for name, text in undone.items() if text and name.startswith(part)} == {
+        name: text for name, text in shown.items() if text and name.startswith(part)
+    }
+
+
+def test_what_a_row_keeps_of_another_mechanism_is_not_copied() -> None:
+    values = values_of(preset_of("two_cylinder_compressor")["spec"])
+    values["/base/parts/1/mechanism/scotch_yoke/crank"] = "70 mm"
+    reshape(values, "add-parts")
+    assert "/base/parts/2/mechanism/slider_crank/crank" in values
+    assert "/base/parts/2/mechanism/scotch_yoke/crank" not in values
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "emptied"),
+    [("/base/drive/stages/0/kind", "rack", "/base/drive/stages/0/"),
+     ("/base/drive/flywheel", "disc", "/base/drive/flywheel/"), ("/base/drive", "linear", "")],
+)  # fmt: skip
+def test_another_kind_empties_its_numbers(service: Service, name: str, kind: str, emptied: str) -> None:
+    """Of the object that has the kind, and only of it; one press of the button brings all of them back."""
+
+    def sent(values: dict[str, str], action: str = "check") -> dict[str, str]:
+        shown = Controls(service.http.post("/new", data={**values, "do": action}).text).values
+        return {key: text for key, text in shown.items() if text}
+
+    shown = sent(_controls(service, "/new?preset=punching_press"))
+    changed = sent(shown | {name: kind})
+    assert changed[name] == kind
+    numbers = {key for key in shown if key.startswith("/base/drive/") and key != name}
+    assert numbers - changed.keys() == {key for key in numbers if emptied and key.startswith(emptied)}
+    undone = sent(changed, "undo")
+    assert {key: undone.get(key) for key in (*numbers, name)} == {key: shown[key] for key in (*numbers, name)}
+
+
+def test_what_the_irregularity_is_without_each_part(service: Service) -> None:
+    shown = _controls(service, "/new?preset=two_cylinder_compressor")
+    sparks = service.http.post("/new/along", data=shown).json()["sparks"]
+    assert [sparks[f"/base/parts/{index}"] for index in (0, 1)] == ["<small>irregularity 0.019 without it</small>"] * 2
+
+
+def test_fields_stay_at_their_sides_of_a_drawing() -> None:
+    study = parse_spec(preset_of("press")["spec"]).study
+    values = values_of(preset_of("press")["spec"])
+    (drawing,) = drawings(study, width=BETWEEN_FIELDS)
+    groups = choices_of(values, base_of(values, {}))
+    (plan,) = sheet_of(values, [drawing], groups, "typed").plans
+    sides = [[spot.path.rpartition(".")[2] for spot in side] for side in (plan.left, plan.right)]
+    assert sorted([*sides[0], *sides[1]]) == ["crank", "ram_mass", "rod", "rod_mass"]
+    name, text = plan.sides
+    left, right = text.split(";")
+    (again,) = sheet_of(values | {name: f"{right};{left}"}, [drawing], groups, "typed").plans
+    assert (again.left, again.right) == (plan.right, plan.left)
+
+
+def _ready(page: Page) -> None:
+    """Wait until the service checks forms, before which it draws no machine."""
+    while page.request.get("/readyz").status != 200:
+        page.wait_for_timeout(200)
+
+
+@pytest.mark.parametrize("visitor", [{"java_script_enabled": False}, {}], indirect=True)
+def test_a_letter_leads_to_its_field(visitor: Visitor) -> None:
+    page, name = visitor.page, "/base/parts/1/mechanism/slider_crank/crank"
+    _ready(page)
+    page.goto("/new?preset=two_cylinder_compressor")
+    page.locator("details.fold > summary").nth(1).click()
+    page.locator(f'a[href="#{name}"] text').click()
+    expect(page.locator(f'[id="{name}"]')).to_be_focused()
+
+
+@pytest.mark.parametrize("width", [1440, 820, 390])
+def test_no_label_is_cut(visitor: Visitor, width: int) -> None:
+    page = visitor.page
+    _ready(page)
+    page.set_viewport_size({"width": width, "height": 900})
+    for address in ("/new?preset=cam_machine", "/new?preset=punching_press", "/new"):
+        page.goto(address)
+        cut = (
+            "labels => labels.filter((each) => each.scrollWidth > each.clientWidth + 1).map((each) => each.textContent)"
+        )
+        assert page.locator(".dim > label:visible").evaluate_all(cut) == []
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
