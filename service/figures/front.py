@@ -74,7 +74,10 @@ def front_figure(found: Designs, x: str | None = None, y: str | None = None) -> 
         for index, (name, colour, which) in enumerate(kinds)
         if which.any()
     )
-    across = Quantity(first, x_unit)
+    across, along = (
+        Quantity(Phrase("design") if name == NUMBER else name, unit)
+        for name, unit in ((first, x_unit), (second, y_unit))
+    )
     note = "" if len(found.numbers) else _NOTHING
     below = (
         plural(
@@ -85,7 +88,7 @@ def front_figure(found: Designs, x: str | None = None, y: str | None = None) -> 
         if far
         else ""
     )
-    panel = Panel(Quantity(second, y_unit), lines, x=across)
+    panel = Panel(along, lines, x=across)
     return Figure(across, (panel,), note=note, below=below, most=20_000)
 
 

@@ -44,7 +44,7 @@ from sprag.service.reading.wording import unit_text
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.figures.figure import Figure, Panel, Quantity
+    from sprag.service.figures.figure import Figure, Fill, Panel, Quantity
 
 #: Widths of a picture that a page has for a wide and for a narrow place (px), and of one in two columns.
 WIDE: Final = 720
@@ -329,6 +329,10 @@ class _Painting(Painting):
             return Rows([], 0.0)
         return rows_of(map(line_entry, map(self._seen, listed)), column.width + column.numbers)
 
+    def _filled(self, fill: Fill) -> Fill:
+        """An area as the panels show it."""
+        return replace(fill, colour=colour_beside(fill.key, fill.colour, self._chosen)) if self._chosen else fill
+
     def _seen(self, line: Line) -> Line:
         """A line as the panels show it: beside the chosen one, grey."""
         if not self._chosen:
@@ -347,7 +351,9 @@ class _Painting(Painting):
         if len(listed) > MANY and not any(line.heading for line in listed):
             self._rows(blocks(listed, self._width - 20.0, heading))
         elif len(listed) + len(fills) > (0 if named or figure.family else 1):
-            self._rows(rows_of([*map(fill_entry, fills), *grouped(listed)], self._width - 8.0, heading))
+            self._rows(
+                rows_of([*map(fill_entry, map(self._filled, fills)), *grouped(listed)], self._width - 8.0, heading)
+            )
         elif figure.family and named:
             self._text(gettext("A curve for each: {quantities}", quantities=heading))
 

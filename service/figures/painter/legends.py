@@ -34,6 +34,8 @@ _SIGN: Final = 26.0
 _BEHIND: Final = 16.0
 _MOST_LETTERS: Final = 60
 _BLOCK: Final = 12.0
+#: Dashes of the sign of a line that has a marker in its middle.
+_BESIDE_MARKER: Final = "3 3"
 
 
 class Entry(NamedTuple):
@@ -54,11 +56,14 @@ def line_entry(line: Line) -> Entry:
     """The entry of a line."""
     colour = colour_of(line.colour)
     width = 3.0 if line.wide else 2.0
+    marked = line.marked(line.x.size)
     dash = DASHES[line.style % len(DASHES)]
+    if marked and dash:  # its gaps are beside the marker
+        dash = _BESIDE_MARKER
     parts = (
         [element("path", d="M2 0h18", stroke=colour, stroke_width=width, stroke_dasharray=dash)] if line.joined else []
     )
-    if line.marked(line.x.size):
+    if marked:
         parts.append(sign_of(line.marker, colour, ring=line.ring))
     return Entry("".join(parts), shortened(line.name, _MOST_LETTERS))
 

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from sprag.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity, line_colours
+from sprag.service.figures.figure import PALETTE, Figure, Fill, Line, Panel, Quantity, line_colours
 from sprag.service.figures.painter.elements import SMALL, lines_of, text_width
 from sprag.service.figures.painter.scales import Scale, rounded_scale, tick_text
 from sprag.service.figures.svg import picture_svg, spark, svg
@@ -60,6 +60,17 @@ def test_a_legend_names_curves_that_lie_on_each_other() -> None:
     together = svg(figure(1.0, 1.001, 1.002))
     assert 'class="name"' not in together
     assert together.count("1.001 mm</text>") == 1
+
+
+def test_a_legend_has_the_signs_of_its_panels() -> None:
+    """Of the line that is meant the area is ink too, and a dashed line is dashed beside its marker."""
+    fill = Fill("5 to 95 %", X, X, 2.0 * X, PALETTE[0], key="0")
+    middle = Line("50 %", X, 1.5 * X, PALETTE[0], key="0")
+    nominal = Line("nominal", X, 1.5 * X, PALETTE[0], 1, key="0", cases=np.arange(9))
+    panel = Panel(Quantity("speed", "rpm"), (middle, nominal), fills=(fill,))
+    drawn = svg(Figure(Quantity("load", "N*m"), (panel,)), chosen="0")
+    assert re.findall(r'<rect[^>]* fill="([^"]*)" fill-opacity="[^"]*"', drawn) == ["var(--ink)"]
+    assert re.findall(r'd="M2 0h18"[^>]*?(?: stroke-dasharray="([^"]*)")?/>', drawn) == ["", "3 3"]
 
 
 def test_points_are_links_to_their_cases() -> None:
