@@ -52,7 +52,9 @@ def machine_drawings(
         mechanism = part["mechanism"]
         kind = str(mechanism["kind"])
         plain = kind in {"none", "table", "formula"}
-        title = gettext("Shaft") if plain else titled(mechanism.get("quick_return", kind))
+        title = gettext("Shaft") if plain else titled(kind)
+        if kind == "quick_return":
+            title = f"{title} ({titled(mechanism[kind])})"
         at = f"parts.{index}." if several else ""
         title = _of_part(index + 1, title) if several else title
         found.append(_drawing(title, sketch, f"{at}mechanism", kind, width or _WIDTH))

@@ -150,11 +150,13 @@ def _along(report: Report) -> Iterator[Section]:
     fixed = {**line.by, **line.at}
     nominal = [Phrase("nominal drive")] if DRIVE in fixed else []
     others = (held_text(report.study, path, value) for path, value in fixed.items() if path != DRIVE)
-    held = joined("; ", (*nominal, *others))
+    count = curve.run().size
+    some = [plural("{shown} of {count} point", "{shown} of {count} points", count, shown=len(shown))]
+    about = joined("; ", (*nominal, *others, *(some if len(shown) < count else ())))
     title = _("Answers along the axis: {axis}", axis=read.within(found.query.x))
     meant = next((row for row, index in enumerate(shown) if curve.line.x[index] == found.point), None)
     table = Table(tuple(heads), tuple(rows), tuple(range(1 + len(names))), chosen=meant)
-    yield Section(title, (*([Text(upper_first(read.say(held)))] if held else []), table), 2)
+    yield Section(title, (*([Text(upper_first(read.say(about)))] if about else []), table), 2)
     yield Section("", tuple(_main(report, _PANELS, _PANELS + 1)), 2)
 
 

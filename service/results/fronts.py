@@ -272,9 +272,14 @@ def worst_of(limit: Limit, values: NDArray[np.float64]) -> NDArray[np.float64]:
 
     ``values`` have the shape (designs, operating points); a missing one is the worst.
     """
+    return np.asarray(values[np.arange(len(values)), worst_places(limit, values)])
+
+
+def worst_places(limit: Limit, values: NDArray[np.float64]) -> NDArray[np.intp]:
+    """The operating points of `worst_of`, shape (designs,)."""
     signs = {"at_least": -1.0, "at_most": 1.0}
     off = signs[limit.kind] * values if limit.kind in signs else np.abs(values - limit.value)
-    return np.asarray(values[np.arange(len(values)), np.where(np.isnan(values), np.inf, off).argmax(axis=1)])
+    return np.asarray(np.where(np.isnan(values), np.inf, off).argmax(axis=1))
 
 
 def further_of(found: Designs) -> Further:

@@ -285,9 +285,17 @@ def _settled(rows: Sequence[Node]) -> list[list[Node]]:
     return cells
 
 
-def choice(name: str, help: str, *values: str, default: str | None = None) -> Described:
-    """A field that is one of ``values``, in which the form has no part."""
-    return Described(name, "", help, "choice", default=default, choices=tuple((value, value) for value in values))
+def choice(
+    name: str,
+    help: str,
+    *values: str,
+    default: str | None = None,
+    label: str = "",
+    called: Mapping[str, str] | None = None,
+) -> Described:
+    """A field that is one of ``values``, in which the form has no part but what it and some of them are ``called``."""
+    choices = tuple((value, (called or {}).get(value, value)) for value in values)
+    return Described(name, label, help, "choice", default=default, choices=choices)
 
 
 def schemas(fields: dict[str, Described]) -> dict[str, Any]:

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 #: Answers of a row.
 ANSWERS: Final = 3
-_GOAL: Final = N_("the best of {count} designs")
+_GOAL: Final = N_("the best design")
 _CALIBRATION: Final = N_("parameters that fit a measurement")
 _BATCH: Final = N_("what tolerances do")
 
@@ -90,7 +90,7 @@ def about(study: Study) -> Phrase:
     """What a study is, in words: ``mean shaft speed along load torque``."""
     asked = asked_by(study)
     if asked == "best":
-        return Phrase(_GOAL, count=study.cases)
+        return Phrase(_GOAL)
     if asked == "measured":
         return Phrase(_CALIBRATION)
     if asked == "tolerances":

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final, Literal
 from sprag.sentences import Amount, Name
 from sprag.service.answers.studies import StudyOrder
 from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.reader import joined
+from sprag.service.reading.reader import Phrase, joined
 from sprag.service.storage.studies.listing import StudyFilter
 from sprag.worker import models
 from sprag.worker.planning.calibrate.plan import CALIBRATE
@@ -21,7 +21,6 @@ from sprag.worker.study import SAME_VALUE
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from sprag.service.reading.reader import Phrase
     from sprag.service.storage.studies.records import StudyRecord
     from sprag.service.views.library import Library
     from sprag.worker.study import Study
@@ -47,7 +46,7 @@ class Relative:
     def title(self) -> Phrase | None:
         """What differs, such as "arm 36 mm"; None where nothing does."""
         parts = (
-            joined(" ", (Name(path, within=True), Amount(value, unit_of(self.study, path), 4)))
+            Phrase("{name} = {value}", name=Name(path, within=True), value=Amount(value, unit_of(self.study, path), 4))
             for path, value in self.differs.items()
         )
         return joined(", ", parts) if self.differs else None

@@ -73,6 +73,17 @@ def test_a_search_shows_its_best_design_with_what_it_was(service: Service) -> No
     assert headline.numbers[0].case == designs[0]["cases"][0]
 
 
+def test_a_search_names_its_operating_points_and_where_a_limit_is_nearest(service: Service) -> None:
+    limits = [{"result": "efficiency", "at_least": "10 %"}]
+    study_id = search(service, best=[{"result": "efficiency", "max": True}], subject_to=limits)
+    headline, reading = found(service, study_id)
+    said = reading.say(headline.numbers[0].where)
+    assert said == "worst of 2 operating points: load torque = 0.2 N·m; load torque = 0.3 N·m"
+    assert reading.say(headline.limits[0].where) == "at load torque = 0.3 N·m"  # the larger load costs efficiency
+    text = service.http.get("/", headers={"Accept": "text/html"}).text
+    assert "the best design" in text  # the number of designs is that of the sheet only: cases are several to a design
+
+
 def _all(service: Service, study_id: str) -> list[Any]:
     found: list[Any] = service.get(f"/studies/{study_id}/front", limit=1000)["designs"]
     return found

@@ -83,13 +83,13 @@ def judged_by(study: Study, known: Sequence[str] | Mapping[str, object]) -> str:
     return next((name for name in wanted if name in known), next(iter(known)))
 
 
-def wanted_of(study: Study, name: str, parameters: Mapping[str, float] | None = None) -> float | None:
+def wanted_of(study: Study, name: str, parameters: Mapping[str, float | str] | None = None) -> float | None:
     """The value (SI) of a result that is wanted, of a case with such ``parameters``; None where there is not one."""
     path = models.presentation_of(study).wanted.get(name)
     if path is None or (parameters is None and path in study.column_paths):
         return None
     value = (parameters or {}).get(path, study.base.get(path))
-    return float(value) if value is not None and np.isfinite(value) else None
+    return value if isinstance(value, float) and np.isfinite(value) else None
 
 
 def told(
@@ -198,7 +198,9 @@ def curve_words(study: Study, by: Mapping[str, float]) -> Phrase:
         (
             term(direction(value))
             if path == SWEEP
-            else joined(" ", (Name(path, within=True), Amount(value, unit_of(study, path), OF_PLACES)))
+            else Phrase(
+                "{name} = {value}", name=Name(path, within=True), value=Amount(value, unit_of(study, path), OF_PLACES)
+            )
             for path, value in by.items()
         ),
     )
@@ -222,7 +224,7 @@ def case_sentence(own: Along, place: int) -> Phrase:
     if own.path in along:
         return Phrase("At {place} {clause}.", place=own.at(place), clause=clause)
     name = Name(axis_name(own.study, own.path).partition(" = ")[0])
-    return Phrase("{name} {place}: {clause}.", name=name, place=own.at(place), clause=clause)
+    return Phrase("{name} = {place}: {clause}.", name=name, place=own.at(place), clause=clause)
 
 
 def _clause(own: Along, place: int) -> Phrase:

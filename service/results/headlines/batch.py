@@ -122,7 +122,7 @@ def _sentence(found: Ribbon, line: RibbonLine, name: str, place: int) -> Phrase:
     at = Amount(line.line.x[place], found.places.units[found.places.x], OF_PLACES)
     if found.places.x in models.presentation_of(study).along[:1]:
         return Phrase("At {place} {clause}.", place=at, clause=clause)
-    return Phrase("{name} {place}: {clause}.", name=Name(found.places.x), place=at, clause=clause)
+    return Phrase("{name} = {place}: {clause}.", name=Name(found.places.x), place=at, clause=clause)
 
 
 def _numbers(found: Ribbon, line: RibbonLine, name: str, place: int, reached: Yield) -> tuple[KeyNumber, ...]:

@@ -24,7 +24,7 @@ def calibrated_headline(found: Calibration) -> Headline:
     values = joined(
         "; ",
         (
-            joined(" ", (Name(one.label, within=place > 0), value))
+            Phrase("{name} = {value}", name=Name(one.label, within=place > 0), value=value)
             for place, (one, value) in enumerate(zip(every, amounts, strict=True))
         ),
     )

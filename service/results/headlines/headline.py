@@ -80,12 +80,11 @@ class KeyNumber:
         return self.interval(reading) or number(None)
 
     def interval(self, reading: Reading) -> str:
-        """The ends of its interval for a reader; "" without one."""
+        """The ends of its interval for a reader, once where both read the same; "" without one."""
         if self.low is None or self.high is None:
             return ""
-        return Phrase("{low} to {high}", low=self._shown(self.low, reading), high=self._shown(self.high, reading)).said(
-            reading
-        )
+        low, high = self._shown(self.low, reading), self._shown(self.high, reading)
+        return low if low == high else Phrase("{low} to {high}", low=low, high=high).said(reading)
 
     def said(self, reading: Reading) -> str:
         """Its value with the unit, and where it holds."""

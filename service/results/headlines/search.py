@@ -9,7 +9,7 @@ import numpy as np
 from sprag.sentences import Amount, Name
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.reader import Phrase, joined, plural, term
-from sprag.service.results.fronts import history, worst_of
+from sprag.service.results.fronts import history, worst_places
 from sprag.service.results.headlines.headline import (
     DIMENSION_DIGITS,
     MOST,
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 _BETTER: Final = 1e-3
 #: Share of the generations without an improvement after which a search has converged, and the least number of them.
 _WITHOUT, _LEAST = 0.15, 3
+#: Most operating points that are named.
+_LISTED: Final = 4
 #: Reserves below this share are none.
 _NONE: Final = 0.005
 
@@ -96,8 +98,23 @@ def _points(found: Designs) -> Phrase:
     if count == 1:
         return NOTHING
     if found.plan.over == "mean":
-        return plural("mean of {count} operating point", "mean of {count} operating points", count)
-    return plural("worst of {count} operating point", "worst of {count} operating points", count)
+        taken = plural("mean of {count} operating point", "mean of {count} operating points", count)
+    else:
+        taken = plural("worst of {count} operating point", "worst of {count} operating points", count)
+    listed = joined("; ", (_point(found, place) for place in range(count))) if count <= _LISTED else NOTHING
+    return joined(": ", filter(None, (taken, listed)))
+
+
+def _point(found: Designs, place: int) -> Phrase:
+    """An operating point: its parameters with their values."""
+    values = found.plan.at[place].items()
+    return joined(
+        ", ",
+        (
+            Phrase("{name} = {value}", name=Name(path, within=True), value=Amount(value, unit_of(found.study, path), 4))
+            for path, value in values
+        ),
+    )
 
 
 def _dimension(found: Designs, best: int, place: int) -> KeyNumber:
@@ -119,12 +136,14 @@ def _limit(found: Designs, best: int, limit: Limit) -> KeyNumber:
         text = term(str(cell)) if info.kind == "category" else Amount(limit.value, info.unit)
         note = Phrase("as required") if met else Phrase("required: {value}", value=text)
         return KeyNumber(limit.name, str(term(own)) if isinstance(own, str) else own, info.unit, note=note, case=case)
-    value = float(worst_of(limit, values[np.newaxis])[0])
+    place = int(worst_places(limit, values[np.newaxis])[0])
+    value = float(values[place])
     off = value - limit.value
     reserve = {"is": limit.within - abs(off), "at_least": off, "at_most": -off}[limit.kind]
     unit, bound = info.unit, _amount(found, limit.name, limit.value)
     note = _reserve(limit, bound, reserve / limit.scale)
-    return KeyNumber(limit.name, value, unit, digits(value), note=note, case=case)
+    where = Phrase("at {place}", place=_point(found, place)) if len(found.plan.at) > 1 else NOTHING
+    return KeyNumber(limit.name, value, unit, digits(value), where=where, note=note, case=case)
 
 
 def _reserve(limit: Limit, bound: Amount, share: float) -> Phrase:

@@ -39,7 +39,13 @@ from sprag.worker.models import machine_shaft
 from sprag.worker.models.parameters import model_parameter
 
 _MEAN_HELP: Final = "which mean of the speed the given mean speed and the irregularity refer to"
-MEAN_SPEED_IS: Final = choice("mean_speed_is", _MEAN_HELP, "midrange", "angle", "time", default="midrange")
+MEAN_SPEED_IS: Final = choice(
+    "mean_speed_is", _MEAN_HELP, "midrange", "angle", "time", default="midrange", label=N_("Mean speed means"),
+    called={
+        "midrange": N_("middle of largest and smallest"), "angle": N_("mean over the angle"),
+        "time": N_("mean over time"),
+    },
+)  # fmt: skip
 SHAFT: Final = Record(
     {
         "cycle": CYCLE,

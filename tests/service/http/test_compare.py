@@ -256,7 +256,7 @@ def test_a_chart_has_five_curves_and_says_what_it_leaves_out(service: Service) -
     family = {"by": "excitation.frequency", "show": six[:4]}
     names, text = drawn(**family)
     assert names == ["20"] * 4
-    assert "Without one here: excitation frequency 22 Hz." in text
+    assert "Without one here: excitation frequency = 22 Hz." in text
     names, _ = drawn(**family, of="excitation.frequency=22 Hz")
     assert names == ["22"] * 4
     assert len(rows(service, six)) == 12

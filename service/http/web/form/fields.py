@@ -7,6 +7,7 @@ field.
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 #: The model that the form describes unless another is chosen.
 FORM_MODEL: Final = "vibration-drive"
+#: The path of a number of one of several parts of a list.
+_OF_A_LIST: Final = re.compile(r"\.\d+\.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,9 +152,10 @@ def result_choices(reading: Reading, rows: Callable[[str], int], *, numbers: boo
 def label_of(name: str, model: str, path: str = "") -> str:
     """What a list of parameters or results calls one; headings of pasted columns are these in English, or paths.
 
-    ``path`` is the whole path of one whose English label has less.
+    ``path`` is the whole path of one whose English label has less; one of a list of parts has its caption.
     """
-    return words(name) if current() == ENGLISH else Reading(model).caption(path or name)
+    plain = current() == ENGLISH and not _OF_A_LIST.search(name)
+    return words(name) if plain else Reading(model).caption(path or name)
 
 
 def categories(model: str) -> tuple[str, ...]:

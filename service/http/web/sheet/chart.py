@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from sprag.service.figures.figure import Figure
     from sprag.service.reading.reader import Reading
     from sprag.service.results.choice import MapQuery
-    from sprag.service.results.curves import Curves
+    from sprag.service.results.curves import Curve, Curves
     from sprag.service.results.key_answers import StudyAnswers
     from sprag.service.views.library import Library
     from sprag.service.views.study_view import StudyView
@@ -177,7 +177,7 @@ def _map(
 
 
 def results_of(
-    study: Study, infos: tuple[ResultInfo, ...], params: QueryParams, drawn: Curves
+    study: Study, infos: tuple[ResultInfo, ...], params: QueryParams, drawn: Curves | None = None
 ) -> tuple[tuple[str, ...], list[str]]:
     """The results that are drawn, and those that the lower chart can show: none where others are asked for.
 
@@ -189,7 +189,8 @@ def results_of(
     plan = curve_plan(study)
     known = plan.results if plan is not None else tuple(info.name for info in infos if info.kind != "category")
     first = judged_by(study, known)
-    empty = {name for curve in drawn.curves for name in curve.y if not _numbered(drawn, name)}
+    curves = () if drawn is None else drawn.curves
+    empty = {name for curve in curves for name in curve.y if not _numbered(curves, name)}
     known = tuple(name for name in known if first in empty or name not in empty)
     others = (*models.presentation_of(study).below, *main_results(study, infos))
     below = list(dict.fromkeys(name for name in others if name in known and name != first))[:4]
@@ -198,8 +199,8 @@ def results_of(
     return (first, *([second] if second else ())), below
 
 
-def _numbered(drawn: Curves, name: str) -> bool:
-    return any(np.isfinite(curve.shown(name)).any() for curve in drawn.curves if name in curve.y)
+def _numbered(curves: Sequence[Curve], name: str) -> bool:
+    return any(np.isfinite(curve.shown(name)).any() for curve in curves if name in curve.y)
 
 
 def _curves(

@@ -70,9 +70,10 @@ def _label(study: Study, reading: Reading, path: str, best: Mapping[str, float])
     """The value at a dimension: the ends of what varies, the width of a tolerance."""
     si = unit_of(study, path)
     axis = study.axis_of(path)
-    if axis is not None and not best and len(study.axes[axis]) > 1:
+    chosen = axis is not None and not best.keys().isdisjoint(study.axes[axis].paths)
+    if axis is not None and not chosen and len(study.axes[axis]) > 1:
         values = study.axes[axis].array
         low, high = (number(reading.value(float(end), si), DIMENSION_DIGITS) for end in (values.min(), values.max()))
         return f"{low}…{high} {unit_text(reading.unit(si))}".strip()
-    value = float(study.axes[axis].array[0]) if axis is not None and not best else study.base[path]
+    value = float(study.axes[axis].array[0]) if axis is not None and not chosen else study.base[path]
     return reading.say(joined("", [with_tolerance(study, path, Amount(value, si, DIMENSION_DIGITS))]))

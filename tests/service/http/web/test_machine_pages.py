@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import pytest
 
+from sprag.service.http.web.sheet.machine import machine_of
+from sprag.service.reading.reader import Choice
+from sprag.service.views.library import reading_of
 from sprag.worker import models
 from tests.service.http.web.test_accessibility import preset
 from tests.service.spec.machine.test_shaft import PRESS
@@ -109,3 +112,36 @@ def test_the_legend_looks_as_the_curves_do(service: Service, press: str) -> None
     chart = chart[: chart.index("</figure>")]
     assert "var(--ink)" in chart
     assert "var(--series-" not in chart
+
+
+def test_an_interval_whose_ends_read_the_same_is_one_number(service: Service, press: str) -> None:
+    numbers = re.findall(r'<dd class="value">([^<]+)', page(service, f"/studies/{press}?point=17"))
+    assert "41.9 " in numbers
+    assert [text for text in numbers if " to " in text] == ["0.209 to 0.263", "1250 to 1571 "]
+
+
+def test_a_report_says_how_many_points_have_a_row(service: Service, press: str) -> None:
+    assert "Mean speed = 120 rpm; 10 of 13 points" in page(service, f"/studies/{press}/document")
+
+
+def test_the_drawing_of_a_best_design_has_its_operating_points(service: Service) -> None:
+    spec = preset("least_flywheel")
+    study_id = service.submit(spec)
+    study, reading = service.store.studies.study(study_id), reading_of(service.store, study_id, Choice("workshop"))
+    drawn = machine_of(study, service.store.studies.spec(study_id), study_id, reading, {"drive.inertia": 57.0})
+    values = {caption: value for caption, value, _ in drawn.others}
+    assert values == {"Inertia of the drive": "57 kg·m²", "Mean speed": "100…140 rpm"}
+
+
+def test_a_name_that_ends_with_a_number_is_apart_from_its_value(service: Service) -> None:
+    study_id = computed(service, preset("slotter"))
+    assert "Curve: resistance in step 0 = 4000 N" in page(service, f"/studies/{study_id}")
+
+
+def test_the_form_speaks_of_steps_and_of_means_in_words(service: Service) -> None:
+    text = page(service, "/new?preset=slotter")
+    assert "Mean speed means" in text
+    assert "middle of largest and smallest" in text
+    assert "Resistance in step 0" in text
+    assert "Steps 0" not in text
+    assert "Quick return (Whitworth)" in text
