@@ -280,7 +280,7 @@ def test_studies_of_different_models_or_kinds_are_told_apart(service: Service, t
     service.fill(batched)
     text = service.http.get("/compare", params={"study": [three[0], batched]}).text
     assert "These studies ask different things" in text
-    assert "Half of the drives above" in numbers_of(text)
+    assert "Median of the drives" in numbers_of(text)
     assert "<td>0.5 kg</td><td>0.5 kg ± 5 %, normal</td>" in text
     assert "<td>Mean shaft speed along load torque</td><td>What tolerances do</td>" in text
 

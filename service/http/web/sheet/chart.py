@@ -181,7 +181,7 @@ def results_of(
 ) -> tuple[tuple[str, ...], list[str]]:
     """The results that are drawn, and those that the lower chart can show: none where others are asked for.
 
-    What has no number on the ``drawn`` curves, whose first result has some, is not among these.
+    What has no number on the ``drawn`` curves, whose first result has some, is not among these; None: not drawn yet.
     """
     asked = tuple(name for name in params.getlist("y") if name)
     if asked:
