@@ -104,6 +104,10 @@ def _size(unit: str, si: str) -> float:
     return parse_quantity(f"1 {unit}", si)
 
 
+#: Zeros that count less for a unit than one other number.
+_MUCH: Final = 1_000_000
+
+
 @dataclass(frozen=True, slots=True)
 class Units:
     """The unit in which each kind is shown: ``chosen`` maps SI units to others; what it lacks is shown in SI.
@@ -197,20 +201,24 @@ def workshop_units(model: str) -> dict[str, str]:
 
 
 def typed_units(study: Study, spec: Mapping[str, Any]) -> dict[str, str]:
-    """The unit in which most quantities of each kind were typed, by SI unit; the first one where several tie."""
+    """The unit in which most quantities of each kind were typed, by SI unit; the first one where several tie.
+
+    A zero, such as a phase of 0 deg, says little about units: it counts where nothing else of the kind was typed.
+    """
     votes: dict[str, Counter[str]] = {}
     for si, text in _quantities(study, spec):
         if si == "1" and not isinstance(si, models.Share):
             continue
         try:
-            size = _size(split_quantity(text)[1], si)
+            number, own = split_quantity(text)
+            size = _size(own, si)
         except QuantityError:
             continue
         # A unit that is not offered, or is the SI unit of another kind, could not be told from others in a picture.
         offered = (si, *_BY_UNIT[si].others) if si in _BY_UNIT else ()
         unit = next((unit for unit in offered if _size(unit, si) == size), None)
         if unit is not None:
-            votes.setdefault(si, Counter())[unit] += 1
+            votes.setdefault(si, Counter())[unit] += _MUCH if number else 1
     return {si: counter.most_common(1)[0][0] for si, counter in votes.items()}
 
 

@@ -20,6 +20,7 @@ from sprag.service.figures.curves import curves_figure
 from sprag.service.figures.pictures import draw_figure
 from sprag.service.figures.read import read_figure, read_map
 from sprag.service.figures.svg_map import picture_map
+from sprag.service.http.views import preset_of
 from sprag.service.reading.quantities import KINDS, UNITS_PATTERN, Units, read_units, typed_units, units_for
 from sprag.service.reading.reader import CODES, Choice, Phrase, Reading, reading_for
 from sprag.service.reading.units import parse_quantity
@@ -211,6 +212,14 @@ def test_phrases_are_said_in_the_words_and_units_of_the_reader() -> None:
     assert phrase.said(reading()) == "At load torque = 200 N·mm, 1000 mW"
     assert pickle.loads(pickle.dumps(phrase)).said(reading()) == phrase.said(reading())
     assert phrase.said(reading(Choice("si", CODES))) == phrase
+
+
+def test_a_zero_does_not_choose_the_unit_of_its_kind() -> None:
+    spec = preset_of("one_pendulum")["spec"]  # a phase of 0 deg beside a backlash of 0.005 rad
+    study = parse_spec(spec).study
+    assert typed_units(study, spec)["rad"] == "rad"
+    spec["base"]["pendulums"][0]["backlash"] = 0.005
+    assert typed_units(study, spec)["rad"] == "deg"
 
 
 def test_a_bare_number_that_is_typed_beside_a_unit_has_it() -> None:

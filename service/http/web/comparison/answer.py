@@ -23,13 +23,12 @@ from sprag.service.http.web.comparison.chosen import (
     told_apart_by,
 )
 from sprag.service.http.web.figures.drawn import drawn as drawn_figure
-from sprag.service.http.web.sheet.side import short_titles
 from sprag.service.http.web.view_forms import EMPTY, Fact, fact_of
 from sprag.service.languages import gettext
 from sprag.service.reading.part_names import lower_first
 from sprag.service.reading.reader import Phrase, joined, model_title, plural
 from sprag.service.results.headlines.along import curve_words
-from sprag.service.results.headlines.headline import NOTHING
+from sprag.service.results.headlines.headline import NOTHING, short_titles
 from sprag.service.results.refined import curve_plan
 from sprag.service.views.headline import headline_of, usual_query
 from sprag.service.views.library import reading_of
