@@ -111,7 +111,8 @@ async def _made(
 
     Where the working point is refused, the document ``without_point`` is shown, with what its author has written.
     """
-    shown, faults = None, ()
+    shown = None
+    faults: tuple[Fault, ...] = ()
     try:
         shown = await making
     except FaultError as error:
