@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, fields, replace
+from decimal import Decimal
 from typing import TYPE_CHECKING, Any, Final, Literal
 from urllib.parse import urlencode
 
@@ -11,10 +13,12 @@ from starlette.datastructures import QueryParams
 from sprag.sentences import plural
 from sprag.service.faults import ParameterFault, SelectionError, refused, shown
 from sprag.service.reading.limits import at_most, span
-from sprag.service.reading.numbers import parse_number
+from sprag.service.reading.numbers import in_language, is_ambiguous, parse_number
+from sprag.service.reading.printed import keyboard
 from sprag.service.reading.together import with_last_unit
 from sprag.service.results.explore import ExploreQuery, Plan, plan_of
 from sprag.service.views.rows import first_rows, further_infos
+from sprag.worker import models
 from sprag.worker.limits import MAX_SELECTED
 
 if TYPE_CHECKING:
@@ -24,6 +28,9 @@ if TYPE_CHECKING:
     from sprag.service.reading.reader import Reading
     from sprag.worker.study import Study
 
+#: A number and what is behind it, and the least digits of a printed result.
+_NUMBER: Final = re.compile(r"([-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?)(.*)", re.DOTALL)
+_PRINTED: Final = 3
 _SIGNS: Final = {"min:": ">=", "max:": "<="}
 #: Rows on a page, and most of them; files have more.
 ROWS: Final = 25
@@ -153,6 +160,20 @@ def read_asked(pairs: Sequence[tuple[str, str]], study: Study, reading: Reading)
     )
 
 
+def rounded_to(text: str) -> tuple[str, str]:
+    """The ends of the numbers that are printed as this quantity: ``321.5 rpm`` and ``322.5 rpm`` of ``322 rpm``.
+
+    Pages print no fewer than three digits.
+    """
+    typed = _NUMBER.match(in_language(keyboard(text.strip())).replace("\N{MINUS SIGN}", "-"))
+    if typed is None or is_ambiguous(text):
+        return text, text
+    number = Decimal(typed[1].replace(",", "."))
+    last = min(int(number.as_tuple().exponent), number.adjusted() - _PRINTED + 1)
+    half = Decimal(5).scaleb(last - 1)
+    return f"{number - half}{typed[2]}", f"{number + half}{typed[2]}"
+
+
 def _ends(name: str) -> dict[str, str]:
     return {"least": f"min:{name}", "most": f"max:{name}"}
 
@@ -165,6 +186,7 @@ class _Reader:
         self.faults: list[Fault] = []
         self.further = further_infos(study)
         self.units = self.plan(query).units
+        self.rounded = {info.name for info in models.study_results(study) if info.kind == "real"}
 
     def plan(self, query: ExploreQuery) -> Plan:
         """The checked question; raises SelectionError."""
@@ -190,7 +212,10 @@ class _Reader:
         for key, text in ends.items():
             name, low = key[4:], f"min:{key[4:]}"
             both = with_last_unit([ends[low], ends.get(f"max:{name}", "")]) if low in ends else ["", text]
-            value = self.reading.with_unit(both[key == f"max:{name}"].strip(), self.units.get(name, "1"))
+            text_of_end = both[key == f"max:{name}"].strip()
+            if ends.get(low, "").strip() == ends.get(f"max:{name}", "").strip() and name in self.rounded:
+                text_of_end = rounded_to(text_of_end)[key != low]
+            value = self.reading.with_unit(text_of_end, self.units.get(name, "1"))
             where = key if not of else "least" if key == low else "most"
             self.ask(where, text.strip(), where=(*self.query.where, f"{name} {_SIGNS[key[:4]]} {value}"))
 

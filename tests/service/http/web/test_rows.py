@@ -16,6 +16,7 @@ import pytest
 
 from sprag.service.http.web.form.spec import spec_of
 from sprag.service.http.web.rows import pages
+from sprag.service.http.web.rows.asked import rounded_to
 from sprag.service.http.web.rows.view import rows_view
 from sprag.service.reading.reader import Choice
 from sprag.service.reading.wording import number
@@ -375,3 +376,23 @@ def test_a_wrong_condition_names_the_result_as_the_page_does(
     address = f"/studies/{study_id}/rows?where=shaft.speed.mean%3E%3D1+kg"
     page = html.unescape(read(service, address, 422, **{"Accept-Language": language}))
     assert told in page.partition('role="alert"')[2].partition("</div>")[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "low", "high"),
+    [("322 rpm", "321.5 rpm", "322.5 rpm"), ("321.8", "321.75", "321.85"), ("3 N*m", "2.995 N*m", "3.005 N*m"),
+     ("−0,5", "-0.5005", "-0.4995"), ("2·10⁻³ s", "0.001995 s", "0.002005 s"), ("much", "much", "much")],
+)  # fmt: skip
+def test_a_result_that_equals_a_printed_number_is_one_that_is_printed_so(text: str, low: str, high: str) -> None:
+    assert rounded_to(text) == (low, high)
+
+
+def test_a_printed_result_is_a_condition_that_keeps_its_row(service: Service) -> None:
+    study_id = service.submit()
+    service.fill(study_id)
+    row = next(iter(service.get(f"/studies/{study_id}/explore", limit=1, sort="-shaft.speed.mean")["cases"]))
+    value = {**row["parameters"], **row["results"]}["shaft.speed.mean"]
+    printed = f"{value:.4g} rad/s"
+    asked = {"of": "shaft.speed.mean", "least": printed, "most": printed}
+    page = service.http.get(f"/studies/{study_id}/rows", params=asked, follow_redirects=True).text
+    assert f"cases/{row['case']}" in page
