@@ -77,6 +77,19 @@ def _answer(report: Report) -> Iterator[Block]:
     )
     if rows:
         yield Table(("", "", ""), rows, look="numbers")
+    answers = report.answers
+    if answers is not None and answers.drawn is not None and len(answers.curves) > 1:
+        yield Text(upper_first(read.say(joined("; ", _meant(report)))))
+
+
+def _meant(report: Report) -> tuple[str, ...]:
+    """Which curve is meant: the values of what varies beside its axis, of a batch its nominal drive."""
+    if report.answers is None or report.curve is None:
+        return ()
+    line = report.answers.curves[report.curve].line
+    fixed = {**line.by, **line.at}
+    nominal = (Phrase("nominal drive"),) if DRIVE in fixed else ()
+    return (*nominal, *(held_text(report.study, path, value) for path, value in fixed.items() if path != DRIVE))
 
 
 def _curves(report: Report) -> Iterator[Block]:
@@ -146,13 +159,9 @@ def _along(report: Report) -> Iterator[Section]:
         if moves:
             cells.append(_motion(curve, index))
         rows.append(tuple(cells))
-    line = found.curves[place].line
-    fixed = {**line.by, **line.at}
-    nominal = [Phrase("nominal drive")] if DRIVE in fixed else []
-    others = (held_text(report.study, path, value) for path, value in fixed.items() if path != DRIVE)
     count = curve.run().size
     some = [plural("{shown} of {count} point", "{shown} of {count} points", count, shown=len(shown))]
-    about = joined("; ", (*nominal, *others, *(some if len(shown) < count else ())))
+    about = joined("; ", (*_meant(report), *(some if len(shown) < count else ())))
     title = _("Answers along the axis: {axis}", axis=read.within(found.query.x))
     meant = next((row for row, index in enumerate(shown) if curve.line.x[index] == found.point), None)
     table = Table(tuple(heads), tuple(rows), tuple(range(1 + len(names))), chosen=meant)

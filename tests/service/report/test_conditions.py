@@ -123,3 +123,12 @@ def test_a_tolerance_is_read_as_it_is_printed(service: Service) -> None:
     spec = {**preset("tolerances"), "tolerances": [{"path": "shaft.inertia", "plus_minus": "± 5 %"}]}
     study = service.store.studies.study(service.submit(spec))
     assert [str(text) for _, text in tolerances_of(study)] == ["± 5 %, normal"]
+
+
+def test_the_first_page_tells_which_curve_its_numbers_are_of(service: Service) -> None:
+    study_id = finished(service, "one_pendulum")
+    with languages.language("uk"):
+        first = document(service, study_id).sections[0].blocks
+    assert [block.text for block in first if isinstance(block, Text)][1:] == [
+        "Горизонтальна амплітуда = вертикальна амплітуда = 2 мм; Частота збудження = 25 Гц"
+    ]
