@@ -44,15 +44,15 @@ def _references(made: Trajectory) -> Mapping[str, tuple[Reference, ...]]:
     def level(label: str, value: float, style: int) -> Reference:
         return Reference(label, ends, np.full(2, value), style)
 
-    levels = [level("T_mean", mean, 1), level("T_min", least, 2)]
+    levels = [level("Tₘₑₐₙ", mean, 1), level("Tₘᵢₙ", least, 2)]
     if made.times[0] == 0.0:
-        levels.append(level("T_0", float(values["energy"][0]), 3))
+        levels.append(level("T₀", float(values["energy"][0]), 3))
     within = [angle for angle in made.phi_c if ends[0] <= angle <= ends[1]]
     if within:
         # The work of the drive counts from phi_c, where it is zero.
         start = min(within, key=lambda angle: abs(float(np.interp(angle, made.times, values["s3"]))))
         bounds = np.array([least, float(values["energy"].max())])
-        levels.append(Reference("φ_c", np.full(2, start), bounds, 2))
+        levels.append(Reference("φc", np.full(2, start), bounds, 2))
     whole = Reference("ω² = S₁ + S₂ + S₃ + S₄", made.times, values["omega"] ** 2, 0, wide=True)
     return {_ENERGY: tuple(levels), _SQUARES: (whole,)}
 

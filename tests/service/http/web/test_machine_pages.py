@@ -144,4 +144,13 @@ def test_the_form_speaks_of_steps_and_of_means_in_words(service: Service) -> Non
     assert "middle of largest and smallest" in text
     assert "Resistance in step 0" in text
     assert "Steps 0" not in text
-    assert "Quick return (Whitworth)" in text
+    assert "quick return (whitworth)" in text.lower()
+
+
+def test_a_case_has_no_code_names_in_its_results_and_its_motion(service: Service, press: str) -> None:
+    text = page(service, f"/studies/{press}/cases/30")
+    for name in ("omega_0", "/omega.", "T = T_mean", "T_0", "φ_c"):
+        assert name not in text
+    motion = service.http.get(f"/studies/{press}/cases/30/motion.svg").text
+    assert {"Tₘₑₐₙ", "Tₘᵢₙ", "T₀"} <= set(re.findall(r">([^<>]+)</text>", motion))
+    assert "difference of largest and smallest speed over half their sum" in text
