@@ -31,6 +31,7 @@ from sprag.service.jobs.submission import take_in
 from sprag.service.json_text import timestamp
 from sprag.service.languages import N_
 from sprag.service.reading.directions import ends_in_words
+from sprag.service.reading.part_names import part_name
 from sprag.service.reading.reader import meanings, reading_for
 from sprag.service.results.defaults import no_curves
 from sprag.service.results.regimes import DOUBTFUL
@@ -165,7 +166,7 @@ def _study_page(
         inputs=inputs(study, frame["study"]["spec"], frame["reading"]),
         varying=varying(study, frame["study"]["spec"], frame["reading"]),
         run=run_settings(study, frame["study"]["spec"], frame["reading"]),
-        fits=fits,
+        fits={part_name(pointer.removeprefix("/base/").replace("/", ".")): fit for pointer, fit in fits.items()},
         regimes=kinds.regimes,
         regime_meanings=meanings(models.REGIME_SENTENCES),
         flags={flag: count for flag, count in kinds.flags.items() if flag not in models.REGIME_SENTENCES},
