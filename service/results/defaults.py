@@ -211,13 +211,18 @@ def varying_axes(study: Study) -> list[Axis]:
 
 
 def usual_value(study: Study, axis: Axis) -> float:
-    """The value at which an undrawn axis is held: the base's where the axis contains it, otherwise its middle one.
+    """The value of an axis that is meant where none is named: that nearest to the base's, of two the larger one.
 
+    It is the middle one where the base has none, or one beyond the ends of the axis.
     Of the drives it is the nominal one, of the directions of a sweep up, where there are both.
     """
     base = 0.0 if not NO_PARAMETERS.isdisjoint(axis.paths) else study.base.get(axis.paths[0])
-    index = None if base is None else axis.index_of(base)
-    return float(np.sort(axis.array)[len(axis) // 2]) if index is None else axis.value(index)
+    values = np.sort(axis.array)
+    if base is None or not values[0] <= base <= values[-1]:
+        index = None if base is None else axis.index_of(base)
+        return float(values[len(axis) // 2]) if index is None else axis.value(index)
+    scale = max(abs(float(values[0])), abs(float(values[-1]))) or 1.0
+    return float(min(values.tolist(), key=lambda value: (round(abs(value - base) / scale, 9), -value)))
 
 
 def drawn_numbers(study: Study, query: CurveQuery) -> int:

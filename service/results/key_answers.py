@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
@@ -41,6 +41,8 @@ if TYPE_CHECKING:
 #: Why there is no value: no case there, beyond the ends of the axis, between points that no line joins, no result, or
 #: only results of motions that had not settled.
 Why = Literal["no-case", "outside", "not-joined", "no-result", "unsettled"]
+#: Digits of a place of an axis in print.
+OF_PLACES: Final = 5
 #: Results of all cases by their names, in order of the cases.
 Whole = Callable[[Sequence[str]], "CaseColumns"]
 
@@ -156,14 +158,27 @@ def answers_query(study: Study, infos: Sequence[ResultInfo], chosen: CurveQuery 
 def read_point(study: Study, query: CurveQuery, text: str | None) -> float | None:
     """The working point: the text with or without a unit, otherwise the base's value, or the middle one of the axis.
 
+    A text that is a value of the axis as it is printed is that value.
+
     Raises SelectionError about ``point`` for a text that is no quantity of the axis, and about ``x`` for no axis.
     """
     axis = study.axes[require_axis(study, "x", query.x)]
     if text is not None and text.strip():
-        return value_of(query.x, text.strip(), unit_of(study, query.x), "point")
+        return place_of(study, query.x, text)
     base = study.base.get(query.x)
     between = base is not None and axis.array.min() <= base <= axis.array.max()
     return base if between else usual_value(study, axis)
+
+
+def place_of(study: Study, path: str, text: str) -> float:
+    """A value (SI) of the axis of ``path`` in a text; of two that are printed alike, the one of the axis.
+
+    Raises SelectionError about ``point``.
+    """
+    value = value_of(path, text.strip(), unit_of(study, path), "point")
+    axis = study.axis_with(path).array
+    nearest = float(axis[np.argmin(np.abs(axis - value))])
+    return nearest if math.isclose(nearest, value, rel_tol=0.5 * 10.0 ** (1 - OF_PLACES)) else value
 
 
 def find_answers(

@@ -55,7 +55,12 @@ def rows_of(study: Study, cases: range) -> ChunkResult:
 
 def search(service: Service, rounds: int = 99, **fields: Any) -> str:
     """The id of a study with a goal that has had at most so many rounds; it has ended where there are no more."""
-    study_id = service.submit(spec_of(**fields))
+    return search_of(service, spec_of(**fields), rounds)
+
+
+def search_of(service: Service, spec: dict[str, Any], rounds: int = 99) -> str:
+    """The same of a whole spec."""
+    study_id = service.submit(spec)
     store = service.store
     number, epoch, planner = store.studies.get(study_id).number, store.work.take_over("test"), Rounds(store.work)
     for _ in range(rounds):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from sprag.service.reading.reader import Choice, Reading
+from sprag.service.results.defaults import usual_value
 from sprag.service.results.headlines.headline import KeyNumber, short_titles
 from sprag.service.spec.document import parse_spec
 from sprag.service.views.headline import Headline, headline_of, is_small
@@ -129,6 +130,53 @@ def test_a_batch_tells_its_spread_and_yield_at_one_place(service: Service) -> No
     assert headline.said(reading).startswith("At 0.1 N·m half of the drives run faster than 9")
     both, _ = found(service, study_id, "0.2 N*m")
     assert [text.said(reading)[:12] for text in both.sentence] == ["No case was ", "At 0.1 N·m h", "At 0.3 N·m h"]
+
+
+def test_a_place_that_is_printed_like_a_case_is_that_case(service: Service) -> None:
+    plain = {name: value for name, value in copy.deepcopy(SPEC).items() if name not in {"axes", "combine", "exclude"}}
+    loads = {"axes": [{"path": "shaft.load", "values": [0.0984375, 0.2]}]}
+    study_id = run(service, {**plain, **loads})
+    headline, reading = found(service, study_id, "0.098437 N*m")
+    assert headline.said(reading).startswith("At 0.098437 N·m it runs ")
+    (answer,) = service.get(f"/studies/{study_id}/answers", point="0.098437 N*m")["curves"]
+    assert answer["working_point"][0]["cases"] == [0]
+    headline, reading = found(service, run(service, {**plain, **BATCH, **loads}), "0.098437 N*m")
+    assert headline.said(reading).startswith("At 0.098437 N·m half ")
+
+
+@pytest.mark.parametrize("more", [{}, BATCH])
+def test_a_place_beyond_the_axis_is_told_as_such(service: Service, more: dict[str, Any]) -> None:
+    plain = {name: value for name, value in copy.deepcopy(SPEC).items() if name not in {"axes", "combine", "exclude"}}
+    study_id = run(service, {**plain, **more, "axes": [{"path": "shaft.load", "values": [0.1, 0.3]}]})
+    for point, said, nearest in (("9 N*m", "9", "0.3"), ("-1", "\N{MINUS SIGN}1", "0.1")):
+        headline, reading = found(service, study_id, point)
+        text = f"{said} N·m is beyond the cases; the nearest is at {nearest} N·m. At {nearest} N·m "
+        assert headline.said(reading).startswith(text)
+        assert headline.gap is None
+    assert "beyond" not in found(service, study_id, "0.3 N*m")[0].said(reading)
+
+
+def test_what_a_curve_is_held_at_is_told(service: Service) -> None:
+    plain = {name: value for name, value in copy.deepcopy(SPEC).items() if name not in {"axes", "combine", "exclude"}}
+    axes = [
+        {"path": "excitation.frequency", "values": ["24 Hz", "26 Hz", "28 Hz"]},
+        {"path": "pendulums.0.arm", "values": ["30 mm", "36 mm"]},
+        {"path": "shaft.load", "values": [0.1, 0.3]},
+    ]
+    headline, reading = found(service, run(service, {**plain, "axes": axes}))
+    assert "26 Hz" in reading.say(headline.of)
+    assert "arm of the mass, pendulum 0 = 0.03 m" in reading.say(headline.of)
+
+
+def test_of_an_axis_around_the_base_the_nearest_place_is_meant_everywhere(service: Service) -> None:
+    plain = {name: value for name, value in copy.deepcopy(SPEC).items() if name not in {"axes", "combine", "exclude"}}
+    plain["base"]["shaft"]["load"] = 0.1
+    loads = {"axes": [{"path": "shaft.load", "linspace": [0.05, 0.35, 4]}]}
+    study_id = run(service, {**plain, **BATCH, **loads})
+    headline, reading = found(service, study_id)
+    assert headline.said(reading).startswith("At 0.15 N·m ")
+    study = service.store.studies.study(study_id)
+    assert usual_value(study, study.axis_with("shaft.load")) == pytest.approx(0.15)
 
 
 def test_a_headline_that_takes_long_is_found_elsewhere() -> None:

@@ -16,6 +16,7 @@ from sprag.service.http.routers import page_router
 from sprag.service.http.threads import in_thread
 from sprag.service.http.web.form.entries import Faults, Values, items_of, list_of
 from sprag.service.http.web.form.values import Form
+from sprag.service.http.web.sheet.drawer import with_query
 from sprag.service.http.web.study import shown_study
 from sprag.service.http.work import Attended
 from sprag.service.jobs import checks
@@ -63,7 +64,8 @@ async def extend(context: Ctx, work: Attended, study_id: StudyId, values: Form) 
     # Pressed twice, it submits one study.
     key = f"extend-{study_id}-{hashlib.sha256(content).hexdigest()[:32]}"
     record = await in_thread(take_in, context.store, made, key)
-    return RedirectResponse(f"/studies/{record.id}", status_code=303)
+    point = values.get("point", "").strip()
+    return RedirectResponse(with_query(f"/studies/{record.id}", [("point", point)] if point else []), status_code=303)
 
 
 @router.get("/studies/{study_id:study}/extend")

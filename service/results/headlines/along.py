@@ -13,19 +13,20 @@ from sprag.service.reading.reader import Phrase, joined, term
 from sprag.service.results.headlines.headline import (
     MOST,
     NOTHING,
-    OF_PLACES,
     Gap,
     Headline,
     KeyNumber,
     amount,
+    beyond,
     digits,
     trace_of,
 )
 from sprag.service.results.key_answer_words import answer_facts, curve_name, curve_named, note_of, place_text
-from sprag.service.results.key_answers import answers_at, usual_curve
+from sprag.service.results.key_answers import OF_PLACES, answers_at, usual_curve
 from sprag.service.results.selection import axis_name
 from sprag.worker import models
 from sprag.worker.directions import SWEEP, direction
+from sprag.worker.models import NO_PARAMETERS
 from sprag.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from sprag.sentences import Part
     from sprag.service.results.curves import Curve
     from sprag.service.results.key_answers import CurveAnswers, Found, StudyAnswers
+    from sprag.service.results.refined import Line
     from sprag.worker.models import ResultInfo
     from sprag.worker.study import Study
 
@@ -153,7 +155,7 @@ def along_headline(
     place = curve_place(study, found, name)
     curve = found.drawn.curves[place]
     spot = place_on(curve, judged_by(study, curve.y), found.point, asked=asked)
-    of = curve_words(study, found.curves[place].line.by) if len(found.curves) > 1 else NOTHING
+    of = curve_of(study, curve.line)
     if spot is None:
         return Headline(of=of)
     own = Along(study, {info.name: info for info in infos}, curve, found.query.x, *spot)
@@ -163,8 +165,9 @@ def along_headline(
         low, high = (float(curve.line.x[at]) for at in spot[1])
         gap = Gap(found.query.x, spot[0], low, high)
     y = curve.known(own.first.name)
+    off = beyond(study, found.query.x, found.point or 0.0, spot[0]) if asked and spot[0] != found.point else NOTHING
     return Headline(
-        sentence=tuple(filter(None, (*_sentences(own), _next(own, answers)))),
+        sentence=tuple(filter(None, (off, *_sentences(own), _next(own, answers)))),
         numbers=_numbers(own, answers, found.unit),
         of=of,
         trace=trace_of(curve.line.x, y, spot[1][0]),
@@ -189,6 +192,12 @@ def curve_place(study: Study, found: StudyAnswers, name: str) -> int:
     """The place of a curve by its name in any language; without one, or for an unknown one, that of the usual curve."""
     named = curve_named([curve_name(one, study) for one in found.curves], name) if name else None
     return usual_curve(study, found) if named is None else named
+
+
+def curve_of(study: Study, line: Line) -> Phrase:
+    """What tells a curve apart and what it is held at, with its names; "" for the only curve of a study."""
+    held = {path: value for path, value in line.at.items() if path not in NO_PARAMETERS}
+    return curve_words(study, {**line.by, **held})
 
 
 def curve_words(study: Study, by: Mapping[str, float]) -> Phrase:

@@ -8,23 +8,21 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.sentences import Amount, Name, Whole
-from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.reader import Phrase, joined
 from sprag.service.results.defaults import drawn_results, usual_value
-from sprag.service.results.headlines.along import judged_by
+from sprag.service.results.headlines.along import curve_of, judged_by
 from sprag.service.results.headlines.headline import (
     NOTHING,
-    OF_PLACES,
     Gap,
     Headline,
     KeyNumber,
     Trace,
     amount,
+    beyond,
     digits,
     trace_of,
 )
-from sprag.service.results.key_answers import from_base
-from sprag.service.results.selection import value_of
+from sprag.service.results.key_answers import OF_PLACES, from_base, place_of
 from sprag.service.results.tolerances.batch import Asked
 from sprag.service.results.tolerances.conditions import first_condition
 from sprag.service.results.tolerances.ribbons import QUANTILES, ribbon
@@ -66,17 +64,20 @@ def batch_headline(
     name = judged_by(study, drawn_results(study, infos))
     found = ribbon(study, infos, (name,), asked, QUANTILES, fetch)
     line, place = min(found.lines, key=lambda one: from_base(study, one.line.by)), 0
-    gap = None
+    gap, off = None, NOTHING
     if found.places.x is not None:
         x = _point(study, found.places.x, point)
         place, gap = _place(found.places.x, line, x, asked=bool(point))
+        if point and gap is None and line.line.x[place] != x:
+            off = beyond(study, found.places.x, x, line.line.x[place])
     if not line.spreads[name].quantiles.drives[place]:
         return Headline(gap=gap)
     reached = yields(study, infos, (first_condition(study, name),), asked, 0, fetch)
     return Headline(
-        _sentences(found, line, name, place, gap),
+        tuple(filter(None, (off, *_sentences(found, line, name, place, gap)))),
         _numbers(found, line, name, place, reached),
         trace=trace_of(line.line.x, line.spreads[name].nominal, place) if found.places.x else _spread(line, name),
+        of=curve_of(study, line.line),
         gap=gap,
         case=int(line.line.cases[place]),
         at=None if found.places.x is None else (found.places.x, float(line.line.x[place])),
@@ -85,9 +86,8 @@ def batch_headline(
 
 def _point(study: Study, path: str, text: str | None) -> float:
     if text:
-        return value_of(path, text, unit_of(study, path), "point")
-    axis = study.axis_with(path)
-    return study.base[path] if path in study.base else usual_value(study, axis)
+        return place_of(study, path, text)
+    return usual_value(study, study.axis_with(path))
 
 
 def _place(path: str, line: RibbonLine, x: float, *, asked: bool) -> tuple[int, Gap | None]:

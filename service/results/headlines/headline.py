@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag.sentences import Amount, Name
+from sprag.service.reading.catalogue import unit_of
 from sprag.service.reading.reader import Phrase
 from sprag.service.reading.wording import number, unit_text
+from sprag.service.results.key_answers import OF_PLACES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from sprag.service.reading.reader import Reading
     from sprag.worker.models import ResultInfo
     from sprag.worker.models.presentation import Better
+    from sprag.worker.study import Study
 
 #: Key numbers at most.
 MOST: Final = 4
@@ -31,8 +34,6 @@ _MOST_DIGITS: Final = 5
 DIMENSION_DIGITS: Final = 4
 #: Digits of a large number that keeps its ones.
 _WHOLE: Final = 4
-#: Digits of a place of an axis, which is exact.
-OF_PLACES: Final = 5
 NOTHING: Final = Phrase("")
 
 
@@ -129,7 +130,7 @@ class Headline:
     numbers : at most `MOST` key numbers
     dimensions : of a search its best design, of a calibration the parameters: each with what it was before
     limits : of a search each limit with its reserve
-    of : what the curve is of that the sentence is about, among several; "" for the only one
+    of : what the curve is of that the sentence is about, and what it is held at; "" for the only one
     trace : a line for a thumbnail; None where there is none
     gap : where the sentence is about a place without a case
     case : the case that the sentence is about
@@ -151,6 +152,15 @@ class Headline:
     def said(self, reading: Reading) -> str:
         """Its sentences for a reader."""
         return " ".join(map(reading.say, self.sentence))
+
+
+def beyond(study: Study, path: str, x: float, nearest: float) -> Phrase:
+    """The sentence of a place on the axis of ``path`` behind its last case, or before its first; both are SI."""
+    unit = unit_of(study, path)
+    return Phrase(
+        "{place} is beyond the cases; the nearest is at {nearest}.",
+        place=Amount(x, unit, OF_PLACES), nearest=Amount(nearest, unit, OF_PLACES),
+    )  # fmt: skip
 
 
 def digits(value: float, half_width: float | None = None) -> int:

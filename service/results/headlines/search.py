@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -23,6 +24,8 @@ from sprag.service.results.headlines.headline import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from sprag.service.results.fronts import Designs
     from sprag.worker.models.presentation import Better
     from sprag.worker.planning.goals import Limit
@@ -46,7 +49,7 @@ def search_headline(found: Designs, *, over: bool) -> Headline:
     return Headline(
         sentence=tuple(filter(None, (_best(found, best), _converged(found, over=over) if feasible else NOTHING))),
         numbers=tuple(_goal(found, best, place) for place in range(len(goals)))[:MOST],
-        dimensions=tuple(_dimension(found, best, place) for place in range(len(found.plan.vary))),
+        dimensions=tuple(_dimensions(found, best)),
         limits=tuple(_limit(found, best, limit) for limit in found.plan.subject_to),
         trace=_trace(found),
         case=int(found.front.cases[best, 0]),
@@ -117,12 +120,16 @@ def _point(found: Designs, place: int) -> Phrase:
     )
 
 
-def _dimension(found: Designs, best: int, place: int) -> KeyNumber:
-    """A parameter of the best design, with its value in the base."""
-    path, value = found.plan.vary[place].paths[0], float(found.front.variables[best, place])
-    unit, before = unit_of(found.study, path), found.study.base.get(path)
-    note = NOTHING if before is None else Phrase("{value} before", value=Amount(before, unit, DIMENSION_DIGITS))
-    return KeyNumber(path, value, unit, DIMENSION_DIGITS, note=note, case=int(found.front.cases[best, 0]))
+def _dimensions(found: Designs, best: int) -> Iterator[KeyNumber]:
+    """The parameters of the best design and those derived from them, each with its value in the base."""
+    study, case = found.study, int(found.front.cases[best, 0])
+    values = {one.paths[0]: float(found.front.variables[best, place]) for place, one in enumerate(found.plan.vary)}
+    follows = {path: value for path, value in study.case_parameters(case).items() if path in study.derive}
+    values |= {path: value for path, value in follows.items() if not math.isclose(value, study.base[path])}
+    for path, value in values.items():
+        unit, before = unit_of(study, path), study.base.get(path)
+        note = NOTHING if before is None else Phrase("{value} before", value=Amount(before, unit, DIMENSION_DIGITS))
+        yield KeyNumber(path, value, unit, DIMENSION_DIGITS, note=note, case=case)
 
 
 def _limit(found: Designs, best: int, limit: Limit) -> KeyNumber:

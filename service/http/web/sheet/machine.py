@@ -21,6 +21,7 @@ from sprag.service.reading.wording import number, unit_text
 from sprag.service.results.headlines.headline import DIMENSION_DIGITS
 from sprag.service.results.varied import with_tolerance
 from sprag.worker import models
+from sprag.worker.models.formulas import evaluate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -38,17 +39,19 @@ class Machine:
 
 
 def machine_of(
-    study: Study, spec: Mapping[str, Any], study_id: str, reading: Reading, best: Mapping[str, float]
+    study: Study, spec: Mapping[str, Any], study_id: str, reading: Reading, best: Mapping[str, float], case: int | None
 ) -> Machine:
-    """A study's machine as elements of a page; ``best`` are the numbers of a design (SI).
+    """A study's machine as elements of a page; ``best`` are the numbers of a design (SI), and ``case`` is one of it.
 
     Of the numbers without a place in a drawing, those are shown that vary or were given.
     """
-    shown = replace(study, base={**study.base, **_tied(study, best)}) if best else study
+    best = _whole(study, best) if best else best
+    shown = replace(study, base={**study.base, **best})
     form = models.model_of(study.model).presentation.form
     seen = {item.path: item.origin != "default" for item in inputs(study, spec)
             if item.path in study.base and form.in_sight(item.path)}  # fmt: skip
-    links = {path: f"/new?clone={study_id}#/base/{path.replace('.', '/')}" for path in seen}
+    variant = f"/new?clone={study_id}" + ("" if case is None else f"&case={case}")
+    links = {path: f"{variant}#/base/{path.replace('.', '/')}" for path in seen}
     found = []
     for drawing in drawings(shown):
         labels = {each.path: _label(shown, reading, each.path, best) for each in drawing.dimensions}
@@ -60,20 +63,31 @@ def machine_of(
     return Machine(tuple(found), tuple(others))
 
 
-def _tied(study: Study, best: Mapping[str, float]) -> dict[str, float]:
-    """The numbers of a design with those tied to them."""
+def _whole(study: Study, best: Mapping[str, float]) -> dict[str, float]:
+    """The numbers of a design with those tied to them, and those derived from them."""
     tied = [paths for paths in (axis.paths for axis in study.axes) if paths[0] in best]
-    return {path: best[paths[0]] for paths in tied for path in paths if path in study.base}
+    known = {path: best[paths[0]] for paths in tied for path in paths if path in study.base}
+    derived = evaluate(study.derive, {**study.base, **known}, {}, 1)
+    return known | {path: float(column[0]) for path, column in derived.items()}
 
 
 def _label(study: Study, reading: Reading, path: str, best: Mapping[str, float]) -> str:
     """The value at a dimension: the ends of what varies, the width of a tolerance."""
     si = unit_of(study, path)
+    low, high = (best[path],) * 2 if path in best else _ends(study, path)
+    if low != high:
+        ends = (number(reading.value(end, si), DIMENSION_DIGITS) for end in (low, high))
+        return f"{'…'.join(ends)} {unit_text(reading.unit(si))}".strip()
+    return reading.say(joined("", [with_tolerance(study, path, Amount(low, si, DIMENSION_DIGITS))]))
+
+
+def _ends(study: Study, path: str) -> tuple[float, float]:
+    """The least and the largest value of a number of the machine in all cases; of a batch, of its nominal drive."""
     axis = study.axis_of(path)
-    chosen = axis is not None and not best.keys().isdisjoint(study.axes[axis].paths)
-    if axis is not None and not chosen and len(study.axes[axis]) > 1:
+    if axis is not None:
         values = study.axes[axis].array
-        low, high = (number(reading.value(float(end), si), DIMENSION_DIGITS) for end in (values.min(), values.max()))
-        return f"{low}…{high} {unit_text(reading.unit(si))}".strip()
-    value = float(study.axes[axis].array[0]) if axis is not None and not chosen else study.base[path]
-    return reading.say(joined("", [with_tolerance(study, path, Amount(value, si, DIMENSION_DIGITS))]))
+    elif path in study.derive and study.spread is None:
+        values = study.columns(range(study.cases))[path]
+    else:
+        return study.base[path], study.base[path]
+    return float(values.min()), float(values.max())

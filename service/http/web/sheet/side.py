@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -17,10 +18,12 @@ from sprag.service.reading.part_names import lower_first
 from sprag.service.reading.reader import Phrase, joined, term
 from sprag.service.results.defaults import main_query, varying_axes
 from sprag.service.results.headlines.headline import short_titles
+from sprag.service.results.refined_maps import map_plan
 from sprag.service.results.regimes import DOUBTFUL
 from sprag.service.views.headline import headline_of, is_small
 from sprag.service.views.relatives import asked_by, relatives_of
 from sprag.worker import models
+from sprag.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -75,12 +78,11 @@ class Variant:
 
 @dataclass(frozen=True, slots=True)
 class Trust:
-    """How many cases are certified, of how many; what the others are, and the address that lists them."""
+    """How many cases are certified, of how many; the others of each kind, counted, with the address of their list."""
 
     certified: int
     total: int
-    others: str = ""
-    address: str = ""
+    others: tuple[tuple[str, str], ...]
 
     @property
     def share(self) -> float:
@@ -116,7 +118,7 @@ def _questions(
     this_page = gettext("This page")
     found = [_along(library, study_id, study, related, reading)]
     for asked, (text, none, address) in _QUESTIONS.items():
-        relative = next((one for one in related if one.asked == asked), None)
+        relative = next((one for one in related if one.asked == asked and not one.differs), None)
         if asked == own:
             found.append(Question(gettext(text), this_page, here=True))
         elif relative is not None:
@@ -149,11 +151,24 @@ def _along(library: Library, study_id: str, study: Study, related: Sequence[Rela
         text = reading.say(Phrase("How does it run along the {name}?", name=Name(path, within=True)))
     if asked_by(study) == "along":
         return Question(text, gettext("This page"), here=True)
-    relative = next((one for one in related if one.asked == "along"), None)
+    relative = next((one for one in related if path and _answers_along(one, study, path)), None)
     if relative is None:
         return Question(text, gettext("Not run yet: choose the values"), f"/new?clone={study_id}&asks=axes&batch=")
     answer = brief(_headline(library, relative), reading) or relative.record.name
     return Question(text, answer, f"/studies/{relative.record.id}")
+
+
+def _answers_along(relative: Relative, study: Study, path: str) -> bool:
+    """Whether a relative has the curve along an axis of this very machine, and tells about it."""
+    other = relative.study
+    if relative.asked != "along" or relative.differs:
+        return False
+    query = main_query(other, models.study_results(other))
+    if query is None or map_plan(other) is not None or other.axis_of(query.x) != other.axis_of(path):
+        return False
+    # It tells about the curve nearest to its base.
+    held = {*other.axis_paths} & study.base.keys() - {*other.axis_with(path).paths, *study.axis_paths, *study.derive}
+    return all(math.isclose(other.base[one], study.base[one], rel_tol=SAME_VALUE) for one in held)
 
 
 def _headline(library: Library, relative: Relative) -> Headline | None:
@@ -194,7 +209,7 @@ def _variants(
         for one in related
         if one.asked == asked and (one.differs or {axis.paths for axis in varying_axes(one.study)} == axes)
     ]
-    found = [Variant(study_id, gettext("As drawn"), _first(headline, reading), _spark(headline.trace), here=True)]
+    found = [Variant(study_id, gettext("This study"), _first(headline, reading), _spark(headline.trace), here=True)]
     for one in own[:_VARIANTS]:
         told = _headline(library, one)
         title = reading.say(one.title) if one.title is not None else one.record.name or one.record.id
@@ -230,8 +245,9 @@ def trust_of(study_id: str, progress: Progress, kinds: Kinds) -> Trust:
     doubtful |= {name: count for name, count in kinds.flags.items() if name == models.NOT_SETTLED and not kinds.regimes}
     others = {**doubtful, **failed}
     certified = progress.ok - sum(doubtful.values())
-    text = joined(", ", (joined(" ", (count, term(name))) for name, count in others.items()))
-    first = next(iter(others), "")
-    key = "ending" if first in failed else "regime" if kinds.regimes else "flag"
-    address = f"/studies/{study_id}/rows?{key}={first}" if first else ""
-    return Trust(certified, progress.done, str(text) and text, address)
+    keys = {name: "ending" if name in failed else "regime" if kinds.regimes else "flag" for name in others}
+    listed = tuple(
+        (str(joined(" ", (count, term(name)))), f"/studies/{study_id}/rows?{keys[name]}={name}")
+        for name, count in others.items()
+    )
+    return Trust(certified, progress.done, listed)

@@ -16,8 +16,10 @@ from sprag.service.http.web.view_forms import Fact, fact_of
 from sprag.service.reading.catalogue import unit_of
 from sprag.service.results.choice import value_choices
 from sprag.service.results.headlines.headline import short_titles
+from sprag.service.spec.fields import renamed
 from sprag.service.views.headline import headline_of, usual_query
 from sprag.service.views.library import reading_of
+from sprag.service.views.relatives import asked_by
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,9 +28,21 @@ if TYPE_CHECKING:
     from sprag.service.http.web.sheet.chart import Chart
     from sprag.service.reading.reader import Choice, Reading
     from sprag.service.results.curves import CurveQuery
+    from sprag.service.results.headlines.headline import Gap
     from sprag.service.views.headline import Headline
     from sprag.service.views.library import Library
     from sprag.worker.study import Study
+
+
+@dataclass(frozen=True, slots=True)
+class Missing:
+    """A place without a case that can be run: path, value to send and in print, further cases, name of their study."""
+
+    path: str
+    value: str
+    said: str
+    cases: int
+    name: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,8 +53,9 @@ class Sheet:
     ----------
     faults : why it is not what was asked for
     say : the sentences of the answer; ``of`` says of which curve
-    gap : path, value and value as in print of a case that was asked for and is missing, in the reader's unit
+    gap : the place that was asked for, where it can be run
     fixed, choices : axes that are held, and values of the axes that tell curves apart
+    design : of a search a case of its best design
     """
 
     faults: tuple[Fault, ...]
@@ -52,9 +67,10 @@ class Sheet:
     chart: Chart | None
     machine: Machine
     side: Side
-    gap: tuple[str, str, str] | None = None
+    gap: Missing | None = None
     fixed: list[dict[str, Any]] = field(default_factory=list)
     choices: list[dict[str, Any]] = field(default_factory=list)
+    design: int | None = None
 
 
 def sheet_of(library: Library, study_id: str, given: Sequence[tuple[str, str]], choice: Choice, cases: str) -> Sheet:
@@ -91,12 +107,8 @@ def _sheet(
         for one in (*headline.numbers, *headline.dimensions)
         if isinstance(one.value, float) and one.label in study.base
     }
-    gap, own = None, f"/studies/{study_id}/cases/"
-    if headline.gap is not None:
-        si = unit_of(study, headline.gap.path)
-        value, unit = reading.value(headline.gap.value, si), reading.unit(si)
-        typed = f"{value:.10g}" if unit == "1" else f"{value:.10g} {unit}"
-        gap = headline.gap.path, typed, reading.quantity(headline.gap.value, si)
+    design = headline.case if asked_by(study) == "best" else None
+    own = f"/studies/{study_id}/cases/"
     drawn, at = _roles(chart)
     return Sheet(
         (),
@@ -109,12 +121,25 @@ def _sheet(
         ],
         [fact_of(one, reading, own) for one in headline.limits],
         chart,
-        machine_of(study, library.store.studies.spec(study_id), study_id, reading, best),
+        machine_of(study, library.store.studies.spec(study_id), study_id, reading, best, design),
         side_of(library, study_id, headline, reading),
-        gap,
+        _missing(study, headline.gap, library.store.studies.get(study_id).name, reading),
         fixed_choices(study, drawn, at, reading) if drawn else [],
         value_choices(study, chart.curves) if chart is not None and chart.curves is not None else [],
+        design,
     )
+
+
+def _missing(study: Study, gap: Gap | None, name: str, reading: Reading) -> Missing | None:
+    """The place without a case as a further value of its axis; None where the study cannot be extended by one."""
+    if gap is None or study.combine != "grid" or study.plan is not None:
+        return None
+    axis, si = study.axis_with(gap.path), unit_of(study, gap.path)
+    if axis.index_of(gap.value) is not None:  # its case waits
+        return None
+    value, unit, said = reading.value(gap.value, si), reading.unit(si), reading.quantity(gap.value, si)
+    typed = f"{value:.10g}" if unit == "1" else f"{value:.10g} {unit}"
+    return Missing(gap.path, typed, said, study.cases // len(axis), renamed(name, f", {said}"))
 
 
 def _roles(chart: Chart | None) -> tuple[tuple[str, ...], tuple[tuple[str, str], ...]]:

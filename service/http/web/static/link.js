@@ -137,8 +137,9 @@ sprag.page = async (address, options) => {
 
 // What somebody has ticked, typed or opened in a part goes into the part that takes its place.
 sprag.carry = (mine, theirs) => {
-  const open = [...mine.querySelectorAll("details")].map((part) => part.open);
-  theirs.querySelectorAll("details").forEach((part, at) => { part.open = open[at] ?? part.open; });
+  const open = [...mine.querySelectorAll("details:not([id])")].map((part) => part.open);
+  theirs.querySelectorAll("details:not([id])").forEach((part, at) => { part.open = open[at] ?? part.open; });
+  for (const part of theirs.querySelectorAll("details[id]")) part.open = mine.querySelector(`#${part.id}`)?.open ?? part.open;
   for (const field of mine.querySelectorAll("input:not([type=hidden]), textarea")) {
     const ticked = ["checkbox", "radio"].includes(field.type), place = `[name="${CSS.escape(field.name)}"]`;
     const other = theirs.querySelector(ticked ? `${place}[value="${CSS.escape(field.value)}"]` : place);

@@ -21,7 +21,9 @@ document.addEventListener("keydown", (event) => {
     if (!page || here !== location.href) return;
     const slow = last || Date.now() - drawn >= SLOW;
     if (slow) drawn = Date.now();
-    for (const { id, dataset } of document.querySelectorAll("[data-live]")) {
+    // With the end other things can be done and asked.
+    if (last && root.dataset.whole) sprag.take(page, root.dataset.whole, { keep: true });
+    else for (const { id, dataset } of document.querySelectorAll("[data-live]")) {
       if (dataset.live === "slow" && (!slow || document.querySelector(".stale"))) continue;
       // A list that has become empty has another shape.
       sprag.take(page, page.getElementById(id) ? `#${id}` : whole, { keep: true });

@@ -4,7 +4,7 @@
 // A form with data-swap: a change shows the new page's part (and that of data-also, above the form), and puts its address
 // into the window. What is chosen is an entry of the history, as it is without scripts; what is typed or dragged replaces
 // the current one.
-for (const form of document.querySelectorAll("form[data-swap]")) {
+const swapping = (form) => {
   let latest = 0, asked = null, shown = location.search;
   const CHOSEN = "select, [type=checkbox], [type=radio]";
 
@@ -70,6 +70,9 @@ for (const form of document.querySelectorAll("form[data-swap]")) {
   form.addEventListener("change", (event) => swap(event.target.matches(CHOSEN)));
   // Enter after a change shows its page too, in one entry of the history and without the fields that are empty.
   form.addEventListener("submit", (event) => { event.preventDefault(); swap(true); });
-  window.addEventListener("popstate", () => { if (location.search !== shown) go(); });
+  window.addEventListener("popstate", () => { if (form.isConnected && location.search !== shown) go(); });
   document.addEventListener("sprag:found", () => asked?.());
-}
+};
+for (const form of document.querySelectorAll("form[data-swap]")) swapping(form);
+// A part that takes the place of another one may have such a form.
+document.addEventListener("sprag:drawn", (event) => { for (const form of event.target.querySelectorAll("form[data-swap]")) swapping(form); });

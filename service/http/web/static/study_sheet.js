@@ -3,7 +3,8 @@
 "use strict";
 
 (() => {
-  const NEAR = 0.015; // part of the range from which on the point moves to a case
+  // The point moves to a case from this part of the range on, and of the way to the next case; otherwise to round values.
+  const NEAR = 0.005, OF_WAY = 0.25, ROUND = 100;
   const range = () => document.querySelector("input[data-cases]");
 
   // The line across the panels of both charts, at a value of their axis.
@@ -18,10 +19,11 @@
   document.addEventListener("input", (event) => {
     const field = event.target.closest?.("input[data-cases]");
     if (!field) return;
-    const cases = JSON.parse(field.dataset.cases), wide = field.max - field.min;
-    const nearest = cases.reduce((best, one) => (!best || Math.abs(one[0] - field.value) < Math.abs(best[0] - field.value) ? one : best), null);
-    const hit = nearest && Math.abs(nearest[0] - field.value) <= NEAR * wide;
-    if (hit) field.value = nearest[0];
+    const cases = JSON.parse(field.dataset.cases), wide = field.max - field.min, at = Number(field.value);
+    const [nearest, next] = [...cases].sort((one, other) => Math.abs(one[0] - at) - Math.abs(other[0] - at));
+    const unit = 10 ** Math.floor(Math.log10(wide / ROUND)), round = Number((Math.round(at / unit) * unit).toPrecision(12));
+    const hit = nearest && (Math.abs(nearest[0] - at) <= Math.min(NEAR * wide, next ? OF_WAY * Math.abs(next[0] - nearest[0]) : wide) || nearest[0] === round);
+    field.value = hit ? nearest[0] : round;
     const value = Number(field.value);
     line(value);
     if (!cases.length) return;
@@ -29,6 +31,18 @@
     const told = hit ? [nearest[1]] : [field.dataset.missing.replace("#", printed(value)), below?.[1], above?.[1]];
     document.getElementById("say").textContent = told.filter(Boolean).join(" ");
     field.setAttribute("aria-valuetext", printed(value));
+  });
+
+  // Arrows go from case to case.
+  const STEPS = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 };
+  document.addEventListener("keydown", (event) => {
+    const field = event.target.closest?.("input[data-cases]"), step = STEPS[event.key];
+    if (!field || !step || event.ctrlKey || event.metaKey || event.altKey) return;
+    const at = Number(field.value), ahead = JSON.parse(field.dataset.cases).map(([value]) => value).filter((value) => step * (value - at) > 0);
+    if (!ahead.length) return;
+    event.preventDefault();
+    field.value = step > 0 ? Math.min(...ahead) : Math.max(...ahead);
+    for (const name of ["input", "change"]) field.dispatchEvent(new Event(name, { bubbles: true }));
   });
 
   // A link to a drawer opens it, and closes the menu that it stands in; so does an address that has it.

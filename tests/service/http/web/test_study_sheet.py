@@ -17,7 +17,7 @@ from tests.service.calibrating import calibration
 from tests.service.http.web.fields import named
 from tests.service.http.web.test_accessibility import BEYOND, preset, serve
 from tests.service.rounds import run_round
-from tests.service.searching import search
+from tests.service.searching import GOAL, search, search_of, spec_of
 from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
@@ -67,11 +67,16 @@ def rows_of(study: Study, cases: range) -> ChunkResult:
 def run(service: Service, spec: dict[str, Any]) -> str:
     """The id of a study with these rows, which has ended."""
     study_id = service.submit(spec)
+    end(service, study_id)
+    return study_id
+
+
+def end(service: Service, study_id: str) -> None:
+    """Run a study to its end."""
     store = service.store
     number, epoch = store.studies.get(study_id).number, store.work.take_over("test")
     run_round(store, number, epoch, rows_of)
     store.work.settle(epoch, number)
-    return study_id
 
 
 @pytest.fixture
@@ -158,8 +163,11 @@ def test_the_working_point_tells_its_case_or_both_neighbours(page: Page, kinds: 
     expect(page).to_have_url(re.compile("point=0.25"))
     page.reload()
     expect(page.locator("#say")).to_have_text(neighbours)
+    expect(page.locator("form", has=page.get_by_role("button", name="Run it at"))).to_contain_text("1 further case")
     page.get_by_role("button", name="Run it at 0.25 N·m too").click()
     expect(page.locator("#say")).to_contain_text("it waits for its turn", ignore_case=True)
+    expect(page.get_by_role("link", name="Report")).to_have_attribute("href", re.compile(r"point=0\.25"))
+    expect(page.locator("h1")).to_have_text("As drawn, 0.25 N·m")
 
 
 @pytest.mark.parametrize("page", [{"java_script_enabled": False}], indirect=True)
@@ -177,7 +185,48 @@ def test_without_scripts_it_is_a_plain_form(page: Page, service: Service, kinds:
     assert page.locator(".say").is_visible()
 
 
-def test_questions_and_variants_lead_to_relatives(page: Page, kinds: dict[str, str]) -> None:
+def test_arrows_go_from_case_to_case_and_the_slider_stands_between_them(page: Page, service: Service) -> None:
+    loads = {"axes": [{"path": "shaft.load", "values": [0, 0.1, 0.2, 0.3, 1.6]}]}
+    page.goto(f"/studies/{run(service, {**PLAIN, 'name': 'Wide', **loads})}?point=0.1")
+    slider = page.locator("input[name=point]")
+    slider.focus()
+    for key, value in (("ArrowRight", "0.2"), ("ArrowUp", "0.3"), ("ArrowLeft", "0.2"), ("End", "1.6")):
+        slider.press(key)
+        expect(slider).to_have_value(value)
+        expect(page.locator("#say")).to_contain_text(f"At {value} N·m")
+    slider.evaluate("(field) => { field.value = 0.2187; field.dispatchEvent(new Event('input', { bubbles: true })); }")
+    expect(slider).to_have_value("0.22")
+    expect(page.locator("#say")).to_contain_text("No case was run at 0.22 N·m. At 0.2 N·m")
+
+
+#: A stream whose events a test sends.
+STREAM: Final = """window.EventSource = class extends EventTarget {
+  constructor() { super(); this.readyState = 1; window.stream = this; }
+  close() { this.readyState = 2; }
+};"""
+
+
+def test_with_its_end_a_study_that_is_looked_at_has_all_that_an_ended_one_has(page: Page, service: Service) -> None:
+    study_id = service.submit({**PLAIN, "name": "Looked at", **LOADS})
+    page.add_init_script(STREAM)
+    page.goto(f"/studies/{study_id}")
+    expect(page.get_by_role("button", name="Pause")).to_be_visible()
+    page.locator("#labels").evaluate("(part) => { part.open = true; }")
+    page.locator("#labels [name=notes]").fill("half a no")
+    end(service, study_id)
+    page.evaluate("() => window.stream.dispatchEvent(new Event('end'))")
+    expect(page.get_by_role("button", name="Pause")).to_have_count(0)
+    for text in ("Priority", "Cancel the rest"):
+        expect(page.get_by_text(text, exact=True)).to_have_count(0)
+    expect(page.get_by_role("link", name="How does it move?")).to_be_visible()
+    expect(page.locator("#labels [name=notes]")).to_have_value("half a no")
+    slider = page.locator("input[name=point]")
+    slider.press("End")
+    expect(page.locator("#say")).to_contain_text("At 0.3 N·m")
+    expect(page).to_have_url(re.compile(r"point=0\.3"))
+
+
+def test_questions_and_variants_lead_to_relatives(page: Page, service: Service, kinds: dict[str, str]) -> None:
     page.goto(f"/studies/{kinds['grid']}")
     ask = page.locator(".ask")
     expect(ask.locator(".here")).to_contain_text("How does it run along the load torque?")
@@ -188,8 +237,17 @@ def test_questions_and_variants_lead_to_relatives(page: Page, kinds: dict[str, s
     ):
         expect(ask.get_by_role("link", name=question)).to_have_attribute("href", f"/studies/{kinds[kind]}")
     expect(ask.get_by_role("link", name="How does it move?")).to_have_attribute("href", re.compile(r"/cases/1$"))
+    page.goto(f"/studies/{kinds['variant']}")  # nobody has asked this of the longer arm
+    for question in ("Which design is best?", "What do tolerances do?"):
+        expect(ask.get_by_role("link", name=question)).to_have_attribute("href", re.compile("^/new"))
+    sweep = {"axes": [{"path": "excitation.frequency", "values": ["20 Hz", "25 Hz"]}]}
+    run(service, {**PLAIN, "name": "Along the frequency", **sweep})
+    page.goto(f"/studies/{kinds['batch']}")
+    along = ask.get_by_role("link", name="How does it run along the load torque?")
+    expect(along).to_have_attribute("href", f"/studies/{kinds['grid']}")
+    page.goto(f"/studies/{kinds['grid']}")
     strip = page.locator(".kin")
-    expect(strip.get_by_role("link", name="Arm of the mass, pendulum 0 36 mm")).to_be_visible()
+    expect(strip.get_by_role("link", name="Arm of the mass, pendulum 0 = 36 mm")).to_be_visible()
     strip.get_by_role("checkbox", name="compare Arm").check()
     strip.get_by_role("button", name="Compare the ticked ones").click()
     page.wait_for_url(f"**/compare?study={kinds['grid']}&study={kinds['variant']}")
@@ -208,6 +266,31 @@ def test_each_value_of_the_machine_leads_to_its_field_in_a_variant(page: Page, k
     page.goto(f"/studies/{kinds['grid']}")
     page.locator(".machine").get_by_role("link", name="N·m").click()
     expect(page.locator('a.range[id="/base/shaft/load"]')).to_be_focused()
+
+
+INERTIA: Final = {"pendulums.0.inertia": "1.1 * pendulums.0.mass * pendulums.0.arm^2 + 2e-4 kg*m^2"}
+ARM: Final = {"path": "pendulums.0.arm", "from": "25 mm", "to": "45 mm"}
+
+
+@pytest.fixture
+def derived(service: Service) -> str:
+    """A search whose best design has another arm, and an inertia that follows from it."""
+    best: list[dict[str, Any]] = [{"result": "efficiency", "max": True}]
+    spec = spec_of(best=best, vary=[*GOAL["vary"], ARM])
+    del spec["base"]["pendulums"][0]["inertia"]
+    return search_of(service, {**spec, "derive": INERTIA})
+
+
+def test_what_follows_from_a_best_design_is_drawn_and_told_with_it(page: Page, service: Service, derived: str) -> None:
+    case = service.get(f"/studies/{derived}/front", limit=1)["designs"][0]["cases"][0]
+    inertia = 1e4 * service.get(f"/studies/{derived}/cases/{case}")["parameters"]["pendulums.0.inertia"]
+    page.goto(f"/studies/{derived}")
+    expect(page.locator(".machine")).to_contain_text(f"J = {inertia:.4g} kg·cm²")
+    expect(page.locator("table.design").first.locator("tr").last).to_contain_text(f"Inertia{inertia:.4g}kg·cm²")
+    variant = f"/new?clone={derived}&case={case}"
+    expect(page.get_by_role("link", name="Variant of this design")).to_have_attribute("href", variant)
+    link = page.locator(".machine").get_by_role("link", name="mm", exact=False).last
+    expect(link).to_have_attribute("href", re.compile(re.escape(variant) + "#/base/pendulums/0/"))
 
 
 def test_a_question_that_is_not_answered_yet_begins_a_study_that_asks_it(page: Page, kinds: dict[str, str]) -> None:
