@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Final, cast
 from fastapi import Depends, Path, Query, Request
 from starlette.convertors import Convertor, register_url_convertor
 
+from sprag.sentences import Sentence
 from sprag.service.http.computer import Computes
 from sprag.service.http.kept_files import KeptFiles
 from sprag.service.http.looks import Looks
@@ -131,7 +132,7 @@ def study_with(context: Context, study_id: str, case: int) -> Study:
     """The study, when it has that case; ApiError else."""
     study = context.store.studies.study(study_id)
     if case >= study.cases:
-        raise ApiError("case-not-found", f"The cases of this study are 0 .. {study.cases - 1}.")
+        raise ApiError("case-not-found", Sentence("The cases of this study are 0 to {last}.", last=study.cases - 1))
     return study
 
 

@@ -6,6 +6,8 @@ import re
 from typing import Final
 
 from sprag.service.languages import N_, gettext
+from sprag.service.reading.wording import duration
+from sprag.service.schedules.deadline import FinishError, duration_seconds
 
 #: What follows "day of the week" in a cron expression, and what people say.
 DAYS: Final = {
@@ -36,6 +38,14 @@ def cron_of(days: str, clock: str) -> str:
     found = _CLOCK.fullmatch(clock)
     hour, minute = (str(int(found[1])), str(int(found[2]))) if found else (clock.strip() or "-", "0")
     return f"{minute} {hour} * * {days}"
+
+
+def deadline_said(text: str) -> str:
+    """What people say of the deadline of each run: a time of day, or how long it may take."""
+    try:
+        return gettext("finished within {time}", time=duration(duration_seconds(text)))
+    except FinishError:
+        return gettext("finished by {time}", time=text)
 
 
 def said(cron: str) -> str:

@@ -33,7 +33,7 @@ from sprag.service.presets import preset_names
 from sprag.service.reading.faults import allowed_text, fault_text
 from sprag.service.reading.reader import meanings
 from sprag.service.schedules.fields import AT_ALLOWED, CRON_ALLOWED, ScheduleFields, change_fields
-from sprag.service.schedules.plain import DAYS, cron_of, days_of, said
+from sprag.service.schedules.plain import DAYS, cron_of, days_of, deadline_said, said
 from sprag.service.schedules.report_to import require_deliverable
 from sprag.service.schedules.trouble import usual_flags
 from sprag.service.spec.report import SpecError
@@ -89,6 +89,7 @@ def nights(context: Ctx, hours: Annotated[float, Query(ge=1, le=MOST_HOURS)] = H
         choices=_HOURS,
         pictures=_PICTURES,
         said=said,
+        deadline_said=deadline_said,
         **listed(context.store),
     )
 

@@ -25,6 +25,9 @@ def test_the_scatter_has_every_design_that_has_not_failed(service: Service) -> N
     axes = {"x": "excitation.frequency", "y": "shaft.speed.mean"}
     other = seen(service.http.get(f"/api/v1/studies/{study_id}/front", params={**axes, "format": "svg"}).text)
     assert other.has("Excitation frequency (Hz)", "front", "feasible")
+    numbered = {"x": "design", "format": "svg", "language": "uk"}
+    ukrainian = seen(service.http.get(f"/api/v1/studies/{study_id}/front", params=numbered).text)
+    assert ukrainian.has("Варіант")
 
 
 def test_designs_that_serve_the_derivatives_of_the_polish_are_not_listed(service: Service) -> None:

@@ -13,7 +13,7 @@ from playwright.sync_api import expect
 from sprag.service.http.web.moved import MOVED, OF_CASE, OF_STUDY
 from sprag.service.languages import language
 from sprag.service.reading.times import in_full, when
-from sprag.service.schedules.plain import cron_of, days_of, said
+from sprag.service.schedules.plain import cron_of, days_of, deadline_said, said
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -53,6 +53,15 @@ def test_a_schedule_is_said_in_words_where_these_say_it_all(cron: str, words: st
     assert said(cron) == words
     plain = days_of(cron)
     assert plain is None or cron_of(*plain) == cron
+
+
+def test_a_deadline_is_said_as_its_reader_says_it() -> None:
+    with language("en"):
+        assert [deadline_said(text) for text in ("06:00", "8 год", "90 min")] == [
+            "finished by 06:00", "finished within 8 h", "finished within 90 min",
+        ]  # fmt: skip
+    with language("uk"):
+        assert deadline_said("8 h") == "завершення за 8 год"
 
 
 def test_old_addresses_lead_to_where_their_content_went(service: Service) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -208,6 +209,21 @@ def test_a_schedule_is_kept_changed_paused_and_deleted(house: House, tab: Page) 
     row.get_by_role("button", name="its studies stay").click()
     expect(tab.get_by_text("There is no schedule yet.")).to_be_visible()
     assert house.store.schedules.all() == ()
+
+
+def test_a_first_visit_has_the_zone_of_its_browser(house: House, browser: Browser) -> None:
+    context = browser.new_context(
+        base_url=house.address, timezone_id="Europe/Kyiv", viewport={"width": 390, "height": 900}
+    )
+    page = context.new_page()
+    page.goto("/nights/new")
+    expect(page.get_by_label("Time zone")).to_have_value(re.compile("Europe/K(yi|ie)v"))
+    days, mark = (page.locator(name).first.bounding_box() for name in ('[name="days"]', '[name="when"]'))
+    assert days is not None
+    assert mark is not None
+    assert days["width"] > 120
+    assert mark["width"] < 30
+    context.close()
 
 
 def test_a_study_is_run_once_at_a_time_of_a_zone(house: House, tab: Page) -> None:

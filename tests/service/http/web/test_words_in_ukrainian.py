@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sprag.service.spec.text import load_spec
+from sprag.worker import models
 from tests.service.figures.seen import seen
 
 if TYPE_CHECKING:
@@ -99,3 +100,15 @@ def test_the_working_point_and_the_date_of_the_report_are_as_written(service: Se
     assert "No case was run at 0.15 N·m." in typed
     report = service.http.get(f"/studies/{study_id}/document", headers=UKRAINIAN).text
     assert re.search(r'name="date" form="document" value="\d\d\.\d\d\.\d{4}"', report)
+
+
+def test_a_number_of_a_case_that_there_is_not_is_told_in_the_language_of_the_page(service: Service) -> None:
+    answer = service.http.get(f"/studies/{service.submit()}/cases/99999", headers=UKRAINIAN)
+    assert answer.status_code == 404
+    assert re.search(r"Випадки цього дослідження — від 0 до \d+\.", answer.text)
+
+
+def test_a_speed_is_no_code_name_in_what_results_mean() -> None:
+    for model in models.model_names():
+        for info in models.result_catalogue(model):
+            assert not re.search(r"\bomega(\b|_)", info.description), info
