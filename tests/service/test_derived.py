@@ -39,17 +39,18 @@ def test_a_derived_value_is_shown_as_such(filled: tuple[Service, str]) -> None:
         "pendulums.0.mass": 0.5, "shaft.load": 0.1, INERTIA: pytest.approx(1.1 * 0.5 * 0.03**2 + 2e-4, rel=1e-15),
     }  # fmt: skip
     own = f"/studies/{study_id}"
-    for page in (own, f"{own}/cases/2"):
+    in_words = "1.1 · (mass, pendulum 0) · (arm of the mass, pendulum 0)² + 0.0002 kg·m²"
+    for page, formula in ((own, in_words), (f"{own}/cases/2", STORED)):
         text = service.http.get(page).text
         assert re.search(rf'title="{INERTIA}[^"]*">Inertia, pendulum 0 <small class="soft">\(derived\)</small>', text)
-        assert STORED in text
+        assert formula in text.replace("\N{NO-BREAK SPACE}", " ").replace("&nbsp;", " ")
     assert '<td class="num">derived</td>' in service.http.get(own).text
     rows = service.http.get(f"{own}/rows", params={"sort": INERTIA}).text
     assert re.search(r'aria-sort="ascending"><a [^>]*>Inertia, pendulum 0</a>', rows)
     # The first two cases have the larger mass, and therefore the larger inertia.
     assert re.findall(r'<tr data-case="(\d+)"', rows) == ["2", "3", "0", "1"]
     report = service.http.get(f"/api/v1{own}/report", params={"names": "codes", "appendix": "inputs"}).text
-    assert f'<th scope="row">{INERTIA}</th><td class="number">{STORED}</td>' in report
+    assert f'<th scope="row">{INERTIA}</th><td class="number">= {FORMULA}</td>' in report
     assert "<td>derived</td>" in report
     assert service.http.get(f"/api/v1{own}/report", params={"format": "pdf"}).status_code == 200
     assert service.http.get(f"/new?clone={study_id}").text.count(f'value="= {FORMULA}"') == 1

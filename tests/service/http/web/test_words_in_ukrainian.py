@@ -33,7 +33,9 @@ def test_a_case_is_told_in_the_words_of_the_reader(service: Service) -> None:
 def test_figures_have_the_language_of_their_page(service: Service) -> None:
     study_id = service.submit()
     service.fill(study_id)
-    address = f"/compare/figure?study={study_id}"
+    page = service.http.get(f"/compare?study={study_id}", headers=UKRAINIAN).text
+    assert seen(page).has("Момент навантаження")
+    address = f"/compare/picture.svg?study={study_id}"
     figure = service.http.get(address, headers={"Accept-Language": "uk"})
     assert seen(figure.text).has("Момент навантаження")
     known = {"If-None-Match": figure.headers["etag"]}
