@@ -73,7 +73,6 @@ def pages(big: str, line: str, cases: int) -> dict[str, str]:
         "what matters": f"{own}/matters",
         "case": f"{own}/cases/{cases // 2}",
         "compare": f"/compare?study={big}&study={line}",
-        "compare: figure": f"/compare/figure?study={line}",
     }
 
 

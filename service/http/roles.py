@@ -62,15 +62,17 @@ _VIEWER: Final = (
         "delete", "extend", "labels", "front", "explore", "explore/new", "explore/compare",
         "rows", "rows/new", "rows/file", "rows/search.svg",
         "matters", "calibration", "drives", "sensitivity", "curves", "map", "cases", "document",
+        "answers", "designs", "report", "reports", "ribbon", "tolerances", "yield",
     )),
     f"GET {_PAGE_CASE}",
     *(f"GET {_PAGE_CASE}/{part}" for part in (
         "motion.svg", "laboratory", "engagements", "branch", "diagram", "basin", "transient",
+        "motion", "strobes", "trajectory",
     )),
-    "GET /compare", "GET /compare/figure", "GET /compare/picture.{form}", "GET /compare/curves.csv",
+    "GET /compare", "GET /compare/picture.{form}", "GET /compare/curves.csv",
     "GET /laboratory", "GET /laboratory/{model}", "GET /laboratory/{model}/{part}",
     "GET /nights", "GET /nights/new", "GET /nights/{schedule_id}",
-    "GET /night", "GET /schedules", "GET /schedules/new", "GET /schedules/{schedule_id}",
+    "GET /night", "GET /tokens", "GET /schedules", "GET /schedules/new", "GET /schedules/{schedule_id}",
 )  # fmt: skip
 _DESIGNER: Final = (
     "POST /api/v1/studies",

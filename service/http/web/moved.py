@@ -34,16 +34,6 @@ OF_STUDY: Final = {
     "ribbon": "matters",
     "tolerances": "matters",
     "yield": "matters",
-    "figures/answers": "",
-    "figures/calibration": "calibration",
-    "figures/curves": "curves",
-    "figures/explore": "explore",
-    "figures/front": "front",
-    "figures/map": "map",
-    "figures/ribbon": "matters",
-    "figures/search": "rows",
-    "figures/sensitivity": "sensitivity",
-    "figures/yield": "matters",
 }
 #: Pages that a case had, all on its own now.
 OF_CASE: Final = ("motion", "strobes", "trajectory")
