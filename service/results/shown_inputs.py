@@ -15,6 +15,7 @@ from sprag.service.reading.part_names import NUMBERED, lower_first, part_name, r
 from sprag.service.reading.wording import number, unit_text, words
 from sprag.service.results.varied import formula_text, values_text
 from sprag.service.spec.described import ANY_RUN, DURATION, SETTLED_RUN
+from sprag.service.spec.machine.shaft import MEAN_SPEED_IS
 from sprag.worker.models.parameters import parameter_of
 
 if TYPE_CHECKING:
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 
 _RUN: Final = {entry.name: entry for entry in (*SETTLED_RUN.values(), DURATION, *ANY_RUN.values())}
 _NUMBER: Final = re.compile(rf"({'|'.join(NUMBERED)})\.(\d+)\.")
+#: What values of choices are called where their own words do not say it.
+_CALLED: Final = {entry.name: dict(entry.choices) for entry in (MEAN_SPEED_IS,)}
 _YES_NO: Final = {"true": N_("yes"), "false": N_("no")}
 _COUNT: Final = re.compile(r"(\d+) (period|revolution)s?")
 
@@ -63,6 +66,8 @@ def in_words(item: Input) -> float | str | None:
     """The value of an input: a choice in words, a count with its unit, a number as it is."""
     if not isinstance(item.value, str):
         return item.value
+    if item.path in _CALLED:
+        return gettext(_CALLED[item.path][item.value])
     if _COUNT.fullmatch(item.value):
         return _counted(item.value)
     parts = item.value.split(", ")

@@ -93,7 +93,7 @@ def test_one_curve_of_several_is_the_drive_s_own(spec: dict[str, Any]) -> None:
         {"path": "shaft.load", "values": [0, 0.2, 0.4]},
     ]
     headline = headline_of(spec, axes=axes)
-    assert headline.of.said(READING) == "horizontal amplitude 0.002 m"
+    assert headline.of.said(READING) == "horizontal amplitude = 0.002 m"
     assert headline.trace.y == pytest.approx([0.04, 0.032, 0.024])
 
 

@@ -247,7 +247,7 @@ def trust_of(study_id: str, progress: Progress, kinds: Kinds) -> Trust:
     certified = progress.ok - sum(doubtful.values())
     keys = {name: "ending" if name in failed else "regime" if kinds.regimes else "flag" for name in others}
     listed = tuple(
-        (str(joined(" ", (count, term(name)))), f"/studies/{study_id}/rows?{keys[name]}={name}")
+        (joined(" ", (count, term(name))), f"/studies/{study_id}/rows?{keys[name]}={name}")
         for name, count in others.items()
     )
     return Trust(certified, progress.done, listed)
