@@ -78,7 +78,7 @@
     if (!link) return false;
     const address = new URL(link.href);
     if (link.dataset.row) address.searchParams.set("row", link.dataset.row);
-    show(address.href, { push: true });
+    show(address.href, { push: true }).then(() => document.querySelector("#rows tbody tr.on a")?.focus());
     return true;
   };
   document.addEventListener("keydown", (event) => {

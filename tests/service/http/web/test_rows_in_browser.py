@@ -188,3 +188,14 @@ def test_numbers_of_points_can_be_read_on_a_phone(visitor: Visitor, example: str
     )
     assert min(heights) >= 9
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def test_arrows_lead_to_the_pages_beside_and_go_on_from_there(visitor: Visitor, example: str) -> None:
+    page = visitor.page
+    page.goto(f"/studies/{example}/rows?limit=4&where=")
+    place = page.locator("#pane nav b")
+    page.locator("#rows tbody tr[data-case] a").last.click()
+    for key, told in (("ArrowDown", 5), ("ArrowUp", 4), ("ArrowUp", 3), ("ArrowDown", 4), ("ArrowDown", 5)):
+        expect(page.locator("#rows tbody tr.on a")).to_be_focused()
+        page.keyboard.press(key)
+        expect(place).to_have_text(f"No. {told} of 9")
