@@ -39,18 +39,18 @@ class Machine:
 
 
 def machine_of(
-    study: Study, spec: Mapping[str, Any], study_id: str, reading: Reading, best: Mapping[str, float], case: int | None
+    study: Study, spec: Mapping[str, Any], reading: Reading, best: Mapping[str, float], variant: str
 ) -> Machine:
-    """A study's machine as elements of a page; ``best`` are the numbers of a design (SI), and ``case`` is one of it.
+    """A study's machine as elements of a page; ``best`` are the numbers of a design (SI).
 
-    Of the numbers without a place in a drawing, those are shown that vary or were given.
+    ``variant`` is the address of the form of a variant, as clients see it. Of the numbers without a place in a drawing,
+    those are shown that vary or were given.
     """
     best = _whole(study, best) if best else best
     shown = replace(study, base={**study.base, **best})
     form = models.model_of(study.model).presentation.form
     seen = {item.path: item.origin != "default" for item in inputs(study, spec)
             if item.path in study.base and form.in_sight(item.path)}  # fmt: skip
-    variant = f"/new?clone={study_id}" + ("" if case is None else f"&case={case}")
     links = {path: f"{variant}#/base/{path.replace('.', '/')}" for path in seen}
     found = []
     for drawing in drawings(shown):

@@ -109,6 +109,7 @@ def _sheet(
     }
     design = headline.case if asked_by(study) == "best" else None
     own = f"/studies/{study_id}/cases/"
+    variant = f"{cases.removesuffix(own)}/new?clone={study_id}" + ("" if design is None else f"&case={design}")
     drawn, at = _roles(chart)
     return Sheet(
         (),
@@ -121,7 +122,7 @@ def _sheet(
         ],
         [fact_of(one, reading, own) for one in headline.limits],
         chart,
-        machine_of(study, library.store.studies.spec(study_id), study_id, reading, best, design),
+        machine_of(study, library.store.studies.spec(study_id), reading, best, variant),
         side_of(library, study_id, headline, reading),
         _missing(study, headline.gap, library.store.studies.get(study_id).name, reading),
         fixed_choices(study, drawn, at, reading) if drawn else [],
