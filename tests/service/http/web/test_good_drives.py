@@ -105,10 +105,10 @@ def test_the_yield_above_is_that_of_the_conditions(service: Service) -> None:
     fact = r"Yield</dt><dd class=\"value\">([\d.]+).*?<dd>(.*?)</dd>"
     usual = re.search(fact, page_of(service, study_id), re.DOTALL)
     assert usual is not None
-    assert usual[2] == "irregularity ≤ 110 % of nominal"
+    assert usual[2] == "irregularity ≤ 110 % of nominal, at 120 rpm"
     asked = re.search(fact, page_of(service, study_id, condition="irregularity <= 0.1"), re.DOTALL)
     assert asked is not None
-    assert (asked[1], asked[2]) == ("0", "irregularity ≤ 0.1")
+    assert (asked[1], asked[2]) == ("0", "irregularity ≤ 0.1, at 120 rpm")
 
 
 def test_conditions_are_typed_as_fields_and_kept_as_texts(service: Service) -> None:

@@ -128,7 +128,7 @@ def test_the_drawing_of_a_best_design_has_its_operating_points(service: Service)
     spec = preset("least_flywheel")
     study_id = service.submit(spec)
     study, reading = service.store.studies.study(study_id), reading_of(service.store, study_id, Choice("workshop"))
-    drawn = machine_of(study, service.store.studies.spec(study_id), study_id, reading, {"drive.inertia": 57.0})
+    drawn = machine_of(study, service.store.studies.spec(study_id), reading, {"drive.inertia": 57.0}, "/new?clone=it")
     values = {caption: value for caption, value, _ in drawn.others}
     assert values == {"Inertia of the drive": "57 kg·m²", "Mean speed": "100…140 rpm"}
 

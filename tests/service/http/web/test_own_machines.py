@@ -11,6 +11,7 @@ import pytest
 from sprag.service.http.views import preset_of
 from sprag.service.http.web.form.live import drawn_machine
 from sprag.service.http.web.form.own_machine import single_machine
+from sprag.service.http.web.form.sent import settle
 from sprag.service.http.web.form.spec import spec_of, values_of
 from sprag.service.spec.document import parse_spec
 from tests.service.http.web.controls import Controls
@@ -74,6 +75,7 @@ def test_a_case_is_a_new_study_in_the_motion_that_it_comes_to(service: Service) 
     study_id = service.submit(DRIVE)
     service.fill(study_id)
     shown = _sent(service, f"/studies/{study_id}/cases/100/laboratory")
+    settle(shown)  # numbers with the units beside them
     study = service.store.studies.study(study_id)
     base = parse_spec(spec_of(shown)[0]).study.base
     assert {path: base[path] for path in study.axis_paths} == pytest.approx(study.case_parameters(100))

@@ -132,7 +132,7 @@ def test_the_service_shows_it(service: Service) -> None:
     assert "unsafe" not in policy
     assert service.http.get("/docs/site/adr/0012-one-package.html").status_code == 200
     for name in ("nowhere.html", "../pages.py", "%2e%2e/pages.py", "adr"):
-        assert service.http.get(f"/docs/site/{name}").status_code == 404, name
+        assert service.http.get(f"/docs/site/{name}", follow_redirects=True).status_code == 404, name
     for page in ("/help",):
         assert 'href="/docs/site/"' in service.http.get(page).text
 
