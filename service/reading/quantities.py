@@ -101,7 +101,7 @@ UNITS_PATTERN: Final = _pattern()
 @lru_cache(maxsize=1024)
 def _size(unit: str, si: str) -> float:
     """One ``unit`` in SI; raises QuantityError."""
-    return parse_quantity(f"1 {unit}", si)
+    return 1.0 if unit == si else parse_quantity(f"1 {unit}", si)
 
 
 #: Zeros that count less for a unit than one other number.

@@ -99,7 +99,7 @@ def parse_measured(text: str, convert: Callable[[str, str], float]) -> MeasuredD
     units: tuple[str | None, str | None] = (None, None)
     if _is_header(rows[0].cells):
         rows = with_units(rows)
-        units = _units(rows.pop(0), convert)
+        units = _units_of_row(rows.pop(0), convert)
     return _numbers(table._replace(rows=rows), units, convert)
 
 
@@ -126,7 +126,7 @@ def _is_header(cells: list[str]) -> bool:
     return all(parse_number(cell) is None and not is_ambiguous(cell) for cell in cells)
 
 
-def _units(row: CsvRow, convert: Callable[[str, str], float]) -> tuple[str | None, str | None]:
+def _units_of_row(row: CsvRow, convert: Callable[[str, str], float]) -> tuple[str | None, str | None]:
     """Units of the two columns in the header; None for a column without a unit."""
     if len(row.cells) != len(_QUANTITIES):
         given = ", ".join(row.cells)[:80]

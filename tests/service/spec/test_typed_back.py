@@ -190,7 +190,7 @@ EXAMPLES: Final = sorted(
 
 
 def test_examples_are_collected() -> None:
-    assert {"0; 0.1; 0.2 N*m", "1; 2; 5 kg*m^2", "0.5; 0.7 N*m", "1500 rpm", "0 deg", "200 N*m", "60 periods"} <= {
+    assert {"0; 0.1; 0.2 N*m", "1; 2; 5 kg*m^2", "1500 rpm", "0 deg", "200 N*m", "60 periods"} <= {
         *EXAMPLES, "200 N*m", "60 periods",
     }  # fmt: skip
     assert len(EXAMPLES) > 40
@@ -218,6 +218,7 @@ def test_no_placeholder_escapes() -> None:
         r"\(default or example\) \| typed", r"example( \| typed)?", r"help",
         r"ends\[[01]\].*", r"usual_points", r".* \| number(\(4\))?",
         r"_\(\"[^\"]*\"\)", r".*\| unit", r".*\| safe( if .*)?",
+        r"reading\.quantity\(.*\)",  # `test_every_number_is_typed_back`
         r"\"[^\"]*\" \| typed", r"paste\.example",  # headings of columns, without numbers
         r"\(_\(one\.offered\.hint\) \| typed\) if one\.offered\.hint else .*",  # of `hints`
         r"\(_\(field\.default\) or \(field\.example if .*\)\) \| typed",  # of `fields`
