@@ -97,7 +97,7 @@ def test_a_running_study_is_followed_on_every_page_and_through_a_lost_connection
     for address, part in (
         (f"/studies/{study_id}/cases/249999", "#outcome"),
         (f"/studies/{study_id}/rows?case=0&case=249999", "#rows"),
-        (f"/compare?study={example}&study={study_id}&x=shaft.load", "#head"),
+        (f"/compare?study={example}&study={study_id}&x=shaft.load", "#told"),
     ):
         page.goto(address)
         events = page.locator("[data-events]")
