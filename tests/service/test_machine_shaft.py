@@ -22,6 +22,7 @@ from sprag.service.spec.document import format_of, load_spec, parse_spec
 from sprag.service.storage.store import Store
 from sprag.worker import models
 from sprag.worker.executors.inline import InlineExecutor
+from tests.service.rounds import computed
 from tests.service.shapes import fits
 from tests.service.spec.machine.test_shaft import PRESS, changed
 
@@ -54,13 +55,7 @@ RESULTS = [info.name for info in models.result_infos("machine-shaft", "")]
 @pytest.fixture
 def filled(service: Service) -> tuple[Service, str]:
     """A service with the press, its rows computed and committed as a dispatcher does."""
-    study_id = service.submit(PRESS)
-    study, number = service.store.studies.study(study_id), service.store.studies.get(study_id).number
-    epoch = service.store.work.take_over("test")
-    for chunk in service.store.work.claim(epoch, service.store.work.open_chunks(number)):
-        assert service.store.work.commit(epoch, chunk, models.run_chunk(study, chunk.first, chunk.count))
-    service.store.work.settle(epoch, number)
-    return service, study_id
+    return service, computed(service, PRESS)
 
 
 def engine_rows(study_id_study: Any) -> np.ndarray[Any, Any]:

@@ -37,7 +37,7 @@ class ConditionRow:
     part: str = "nominal"
 
 
-def results_of(study: Study) -> list[str]:
+def conditionable(study: Study) -> list[str]:
     """The results that conditions can be about; half widths of intervals are no results of drives."""
     names = [info.name for info in models.study_results(study)]
     return [name for name in names if name not in set(map(models.half_width, names))]

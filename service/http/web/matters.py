@@ -30,7 +30,7 @@ from sprag.service.http.web.good_drives import (
     RELATIONS,
     condition_rows,
     condition_texts,
-    results_of,
+    conditionable,
     without_rows,
 )
 from sprag.service.http.web.held import fixed_choices, with_held
@@ -197,7 +197,7 @@ def _page(
         conditions=condition_rows(conditions, study),
         relations=RELATIONS,
         parts=PARTS,
-        results=results_of(study),
+        results=conditionable(study),
         fixed=[one for one in fixed if one["path"] != DRIVE],
         asks_more=any(one.asked.setting.label for asked in every for one in asked.fields),
         cases=cases,

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from sprag.service.presets import preset_text
 from sprag.service.spec.text import load_spec
-from sprag.worker import models
 from tests.service.conftest import Service
+from tests.service.rounds import computed
 
 
 def test_a_machine_without_a_motion_has_no_link_but_a_sentence(service: Service) -> None:
-    study_id = service.submit(load_spec(preset_text("press")[1], "toml"))
-    study, record = service.store.studies.study(study_id), service.store.studies.get(study_id)
-    epoch = service.store.work.take_over("test")
-    for chunk in service.store.work.claim(epoch, service.store.work.open_chunks(record.number)):
-        assert service.store.work.commit(epoch, chunk, models.run_chunk(study, chunk.first, chunk.count))
+    study_id = computed(service, load_spec(preset_text("press")[1], "toml"))
     found = service.get(f"/studies/{study_id}/cases", page_size=100)["cases"]
     endings = {row["ending"]: row["case"] for row in found}
     assert set(endings) == {"ok", "inertia_insufficient"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Final
@@ -150,7 +151,7 @@ def _headlines(
 
 
 def _same(one: tuple[str, float], other: tuple[str, float]) -> bool:
-    return one[0] == other[0] and abs(one[1] - other[1]) <= SAME_VALUE * max(abs(one[1]), abs(other[1]))
+    return one[0] == other[0] and math.isclose(one[1], other[1], rel_tol=SAME_VALUE)
 
 
 def _asked_of(library: Library, chosen: Comparison, position: int, *, asked: bool) -> CurveQuery | None:

@@ -3,32 +3,21 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import pytest
 
 from sprag.service.http.web.sheet.machine import machine_of
 from sprag.service.reading.reader import Choice
 from sprag.service.views.library import reading_of
-from sprag.worker import models
 from tests.service.http.web.test_accessibility import preset
+from tests.service.rounds import computed
 from tests.service.spec.machine.test_shaft import PRESS
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service
 
 HTML: Final = {"Accept": "text/html"}
-
-
-def computed(service: Service, spec: Any) -> str:
-    """A finished study with the results of its machine."""
-    study_id = service.submit(spec)
-    study, number = service.store.studies.study(study_id), service.store.studies.get(study_id).number
-    epoch = service.store.work.take_over("test")
-    for chunk in service.store.work.claim(epoch, service.store.work.open_chunks(number)):
-        assert service.store.work.commit(epoch, chunk, models.run_chunk(study, chunk.first, chunk.count))
-    service.store.work.settle(epoch, number)
-    return study_id
 
 
 @pytest.fixture
