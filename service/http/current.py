@@ -31,7 +31,7 @@ class Current:
     page : address of the page that is made; "" for one that answers a form
     usual : the choice of the service, which a page has where nobody chose another
     zone : time zone of the reader of a page
-    zone_known : whether somebody said so: the reader, the browser or the office
+    zone_known : whether somebody said so: the reader, the browser, or an office with another one than UTC
     chosen_zone : where somebody chose it, "" where the browser or the service has it
     """
 

@@ -139,10 +139,11 @@ class Report:
     def _place_of_batch(self, query: CurveQuery | None) -> str | None:
         """The value of the axis at which the answer of a batch holds, which has a case of every drive."""
         batch = self.study.spread is not None and self.study.plan is None and self.chosen is None
-        if not batch or query is None or self.headline.case is None:
+        at = self.headline.at
+        if not batch or query is None or at is None or at[0] != query.x:
             return None
         unit = unit_of(self.study, query.x)
-        return f"{self.study.case_parameters(self.headline.case)[query.x]!r} {'' if unit == '1' else unit}"
+        return f"{at[1]!r} {'' if unit == '1' else unit}"
 
     @cached_property
     def curve(self) -> int | None:

@@ -11,6 +11,7 @@ from sprag.service.figures.ribbons import ribbon_figure
 from sprag.service.languages import _
 from sprag.service.reading.reader import Phrase, joined, plural
 from sprag.service.results.defaults import drawn_results
+from sprag.service.results.headlines.along import judged_by
 from sprag.service.results.tolerances.batch import Asked
 from sprag.service.results.tolerances.conditions import first_condition
 from sprag.service.results.tolerances.ribbons import QUANTILES, ribbon
@@ -43,7 +44,7 @@ def drives_part(study: Study, infos: Sequence[ResultInfo], fetch: Fetch) -> Driv
     names = drawn_results(study, infos)
     try:
         drawn = ribbon(study, infos, names, Asked(), QUANTILES, fetch)
-        wanted = first_condition(study, names[0])
+        wanted = first_condition(study, judged_by(study, names))
         reached = yields(study, infos, [wanted], Asked(), _WORST, fetch)
     except SelectionError as error:
         return DrivesPart(None, "", (Phrase("There are no ribbons here: {why}.", why=str(error)),))

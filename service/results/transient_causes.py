@@ -56,6 +56,14 @@ _CAUSES: Final = (
         "there is {resistance}, the torque of the drive at rest {drive}."
     ),
 )
+#: Causes without numbers, and why there is no steady cycle.
+_WHOLE: Final = (
+    N_(
+        "The load is not smooth in the speed: a transient needs a formula without abs, sign, step, floor, mod, min, "
+        "max or comparisons of omega."
+    ),
+    N_("The torque of the drive does not follow the speed, so it balances no other load."),
+)
 #: What the engine writes after each number, and the SI unit and its factor.
 _UNITS: Final = {
     "time": (" s", "s", 1.0),

@@ -47,8 +47,10 @@ def batch_shown(found: Ribbon, reached: Yield | None) -> Shown:
         causes = _causes_table(places.study, one.spreads[first.name].causes, _of(at, _spread_of(first)), good)
         further = [_causes_table(places.study, one.spreads[info.name].causes, _of(at, _spread_of(info)))
                    for info in others]  # fmt: skip
+        # No drive has a mean over the places where each lacks a result at one.
+        ended = [info for info in found.results if one.spreads[info.name].lowest]
         numbers = [_numbers_table(found, one, good, at), *(_ends_table(info, one.spreads[info.name], at)
-                                                         for info in found.results)]  # fmt: skip
+                                                         for info in ended)]  # fmt: skip
         worst: list[ShownTable] = []
         if reached is not None and good is not None:
             wanted = joined(", ", [condition.text for condition in reached.conditions])

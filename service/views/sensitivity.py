@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from sprag.service.figures.figure import Figure
     from sprag.service.figures.pictures import Picture
     from sprag.service.reading.reader import Reading
+    from sprag.service.results.sensitivity import Effect
     from sprag.service.views.library import Library
     from sprag.worker.study import Study
 
@@ -115,6 +116,11 @@ def _about(item: Sensitivity) -> Phrase:
     )  # fmt: skip
 
 
+def _named(effect: Effect) -> Phrase:
+    """What an effect is of: the paths that vary together."""
+    return joined(" = ", map(Name, effect.paths))
+
+
 def _tables(item: Sensitivity) -> Iterator[ShownTable]:
     """The indices of a result, and its interactions."""
     if item.method == "none":
@@ -132,11 +138,8 @@ def _tables(item: Sensitivity) -> Iterator[ShownTable]:
             for text in (N_("Alone"), "±", N_("With what it does together with others"), "±")
         )
         values = ("first_order", "first_order_error", "total", "total_error")
-    names = [joined(" = ", map(Name, effect.paths)) for effect in item.effects]
-    rows = [
-        [joined(" = ", map(Name, effect.paths)), *(getattr(effect.indices, value) for value in values)]
-        for effect in in_order(item)
-    ]
+    names = [_named(effect) for effect in item.effects]
+    rows = [[_named(effect), *(getattr(effect.indices, value) for value in values)] for effect in in_order(item)]
     yield ShownTable(title, (Column(Phrase("Parameter")), *columns), rows)
     if item.pairs:
         pairs = [[names[pair.first], names[pair.second], pair.index, pair.error] for pair in item.pairs]

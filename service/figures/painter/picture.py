@@ -51,7 +51,8 @@ class Painting:
     def _whole(self, label: str, about: str) -> str:
         """The element around all parts; names of patterns, which begin with ~, differ from those of other pictures."""
         inside = "".join(self._parts)
-        inside = _NAMED.sub(f"p{crc32(inside.encode()):x}-", inside)
+        if "~" in inside:
+            inside = _NAMED.sub(f"p{crc32(inside.encode()):x}-", inside)
         return element(
             "svg", element("desc", escape(about)) + inside, class_="figure",
             viewBox=f"0 0 {short(self._width)} {short(self._top + 4.0)}", width=self._width, height=self._top + 4.0,

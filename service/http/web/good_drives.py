@@ -59,10 +59,13 @@ def condition_rows(texts: Sequence[str], study: Study) -> tuple[list[ConditionRo
     return [*rows, ConditionRow()], others
 
 
-def condition_texts(given: QueryParams, study: Study, reading: Reading) -> list[str] | None:
-    """The conditions of the rows of a form; None where it has no rows. Bare numbers are in the shown units."""
-    if not any(text.strip() for text in given.getlist("of")):
-        return None
+def has_rows(given: QueryParams) -> bool:
+    """Whether an address comes from a form with rows of conditions."""
+    return any(text.strip() for text in given.getlist("of"))
+
+
+def condition_texts(given: QueryParams, study: Study, reading: Reading) -> list[str]:
+    """The conditions of the rows of a form. Bare numbers are in the shown units."""
     infos = {info.name: info for info in models.study_results(study)}
     found = []
     for name, relation, typed, part in zip_longest(*map(given.getlist, _FIELDS), fillvalue=""):

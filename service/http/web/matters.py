@@ -31,6 +31,7 @@ from sprag.service.http.web.good_drives import (
     condition_rows,
     condition_texts,
     conditionable,
+    has_rows,
     without_rows,
 )
 from sprag.service.http.web.held import fixed_choices, with_held
@@ -103,10 +104,10 @@ def seen(
 async def matters_page(work: Attended, study_id: StudyId, ask: Annotated[str, Query(max_length=20)] = "") -> Response:
     """The answer to a question about a study, by default to the first that it has one to."""
     context, given = work.context, work.request.query_params
-    study = await in_thread(context.store.studies.study, study_id)
-    reading = await in_thread(reading_of, context.store, study_id, current().choice)
-    texts = condition_texts(given, study, reading)
-    if texts is not None:
+    if has_rows(given):
+        study = await in_thread(context.store.studies.study, study_id)
+        reading = await in_thread(reading_of, context.store, study_id, current().choice)
+        texts = condition_texts(given, study, reading)
         query = urlencode(without_rows(given, texts))
         return RedirectResponse(f"/studies/{study_id}/matters?{query}", status_code=303)
     return await answered(work, study_id, ask)

@@ -129,27 +129,27 @@ def _line(places: Places, line: Line, conditions: tuple[Condition, ...], worst: 
         nominal,
         failed,
         pending,
-        _nearest(places.study, good, every),
-        _within(places.study, good, every),
+        *_near(places.study, good, every),
         variance_causes(places.study, indicator),
         tuple(whole.worst(places.study, worst)),
     )
 
 
-def _nearest(study: Study, good: NDArray[np.bool_], run: NDArray[np.bool_]) -> Proportion:
-    """The share of good drives among the half of the ``run`` ones that is nearest to nominal in each tolerance."""
-    order = np.argsort(np.abs(deviations(study)[run]), axis=0, kind="stable")[: (run.sum() + 1) // 2]
-    return proportion(good[run][order].sum(axis=0), np.full(order.shape[1], len(order)))
+def _near(study: Study, good: NDArray[np.bool_], run: NDArray[np.bool_]) -> tuple[Proportion, Numbers]:
+    """What drives gain that are near to nominal, in each tolerance.
 
-
-def _within(study: Study, good: NDArray[np.bool_], run: NDArray[np.bool_]) -> Numbers:
-    """The largest distance from nominal, in each tolerance, of drives of which the wanted share is good."""
+    The share of good drives among the half of the ``run`` ones that is nearest to nominal, and the largest distance
+    from nominal of drives of which the wanted share is good.
+    """
     size = np.abs(deviations(study)[run])
     order = np.argsort(size, axis=0, kind="stable")
+    sorted_good = good[run][order]
     counts = np.arange(1, len(order) + 1)[:, None]
-    enough = (np.cumsum(good[run][order], axis=0) >= WANTED * counts) & (counts >= max(_FEWEST, _PART * len(order)))
+    enough = (np.cumsum(sorted_good, axis=0) >= WANTED * counts) & (counts >= max(_FEWEST, _PART * len(order)))
     farthest = np.where(enough, np.take_along_axis(size, order, axis=0), -np.inf).max(axis=0, initial=-np.inf)
-    return np.where(np.isfinite(farthest), farthest, np.nan)
+    half = (len(order) + 1) // 2
+    near = proportion(sorted_good[:half].sum(axis=0), np.full(order.shape[1], half))
+    return near, np.where(np.isfinite(farthest), farthest, np.nan)
 
 
 class _Whole:

@@ -56,6 +56,15 @@ def curve(service: Service, study_id: str, frequency: str) -> tuple[list[float],
     return found["x"], [np.nan if y is None else y for y in found["y"][Y]]
 
 
+def test_values_that_cannot_be_read_leave_the_page_with_its_choices(service: Service, three: list[str]) -> None:
+    query = {"study": three, "by": "excitation.frequency", "of": "excitation.frequency=abc"}
+    page = service.http.get("/compare", params=query, headers={"Accept": "text/html"})
+    assert page.status_code == 422
+    assert 'role="alert"' in page.text
+    assert "Other curves" in page.text
+    assert "Inputs that differ" in page.text
+
+
 def test_the_page_lists_the_inputs_that_differ(service: Service, three: list[str]) -> None:
     page = service.http.get("/compare", params={"study": three, "units": "typed"})
     assert page.status_code == 200

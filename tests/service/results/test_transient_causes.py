@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
-from sprag.engine.machine_shaft.transient_causes import Ends, cause_of
+from sprag.engine.machine_shaft.transient_causes import ROUGH_LOAD, Ends, cause_of
+from sprag.engine.machine_shaft.transient_run import _FIXED_DRIVE
 from sprag.service.languages import language
 from sprag.service.reading.reader import Reading
 from sprag.service.results.transient_causes import cause_phrase
@@ -31,3 +34,12 @@ def test_each_cause_is_told_in_ukrainian(kind: str, outcome: str) -> None:
     assert told != english
     assert not any(word in told for word in ("shaft", "torque", "The "))
     assert ("1,872" in told) == ("1.872" in english)
+
+
+def test_causes_without_numbers_are_told_in_ukrainian() -> None:
+    no_cycle = cause_of("run-up", "not_reached", RESULTS, replace(ENDS, cycle=False, no_cycle=_FIXED_DRIVE))
+    assert _FIXED_DRIVE in no_cycle
+    for english in (ROUGH_LOAD, no_cycle):
+        with language("uk"):
+            told = Reading("machine-shaft").say(cause_phrase(english))
+        assert not any(word in told for word in ("shaft", "torque", "The ")), told

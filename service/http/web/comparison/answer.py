@@ -107,7 +107,10 @@ def answer_of(library: Library, given: Sequence[tuple[str, str]], choice: Choice
     chosen: Comparison | None = None
     faults: tuple[Fault, ...] = ()
     try:
-        chosen = comparison(store, params, records)
+        found = comparison(store, params, records)
+        for position in range(len(records)):
+            found.query(position)
+        chosen = found
     except SelectionError as error:
         faults = error.faults
     asked = any(params.get(name) for name in ("x", "by", "at"))

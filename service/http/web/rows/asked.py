@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field, fields, replace
-from decimal import Decimal
+from decimal import Decimal, DecimalException
 from typing import TYPE_CHECKING, Any, Final, Literal
 from urllib.parse import urlencode
 
@@ -168,10 +168,13 @@ def rounded_to(text: str) -> tuple[str, str]:
     typed = _NUMBER.match(in_language(keyboard(text.strip())).replace("\N{MINUS SIGN}", "-"))
     if typed is None or is_ambiguous(text):
         return text, text
-    number = Decimal(typed[1].replace(",", "."))
-    last = min(int(number.as_tuple().exponent), number.adjusted() - _PRINTED + 1)
-    half = Decimal(5).scaleb(last - 1)
-    return f"{number - half}{typed[2]}", f"{number + half}{typed[2]}"
+    try:
+        number = Decimal(typed[1].replace(",", "."))
+        last = min(int(number.as_tuple().exponent), number.adjusted() - _PRINTED + 1)
+        half = Decimal(5).scaleb(last - 1)
+        return f"{number - half}{typed[2]}", f"{number + half}{typed[2]}"
+    except DecimalException:  # an exponent that no number has; what is wrong with it is told where it is read
+        return text, text
 
 
 def _ends(name: str) -> dict[str, str]:

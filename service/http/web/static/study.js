@@ -71,7 +71,7 @@ const swapping = (form) => {
   // Enter after a change shows its page too, in one entry of the history and without the fields that are empty.
   form.addEventListener("submit", (event) => { event.preventDefault(); swap(true); });
   window.addEventListener("popstate", () => { if (form.isConnected && location.search !== shown) go(); });
-  document.addEventListener("sprag:found", () => asked?.());
+  document.addEventListener("sprag:found", () => { if (form.isConnected) asked?.(); });
 };
 for (const form of document.querySelectorAll("form[data-swap]")) swapping(form);
 // A part that takes the place of another one may have such a form.

@@ -6,8 +6,6 @@ from typing import Any
 
 from playwright.sync_api import Page
 
-from tests.service.figures.seen import Curve, seen
-
 _OPEN = """name => {
   const outer = (element) => element?.closest("details");
   for (let part = outer([...document.getElementsByName(name)].at(-1)); part; part = outer(part.parentElement)) {
@@ -31,10 +29,3 @@ def fill(page: Page, fields: dict[str, str]) -> None:
 def wrong(page: Page, name: str) -> Any:
     """What is said to be wrong beside a field."""
     return page.locator(f'[id="wrong:{name}"]')
-
-
-def drawn(page: Page, selector: str = ".plot") -> list[Curve]:
-    """The curves of a picture, once it is drawn."""
-    page.wait_for_function("selector => document.querySelector(selector)?.dataset.drawn", arg=selector)
-    panels = seen(page.locator(selector).first.inner_html()).panels
-    return [curve for panel in panels for curve in panel.curves]

@@ -12,6 +12,17 @@ if TYPE_CHECKING:
     from tests.service.conftest import Service
 
 
+@pytest.mark.parametrize("text", ["1e9999999", "1e-9999999", "1e400"])
+def test_an_exponent_that_no_number_has_is_refused(service: Service, spec: dict[str, Any], text: str) -> None:
+    study_id = service.submit(spec)
+    service.fill(study_id)
+    ends = {"min:shaft.speed.mean": text, "max:shaft.speed.mean": text}
+    for given in ({"least": text}, ends):
+        answer = service.http.get(f"/studies/{study_id}/rows", params=given, headers={"Accept": "text/html"})
+        assert answer.status_code < 500
+    assert answer.status_code == 422
+
+
 @pytest.mark.parametrize("text", ["²", "٣", "9" * 5000])
 def test_what_is_no_whole_number_is_refused_or_has_no_effect(service: Service, spec: dict[str, Any], text: str) -> None:
     study_id = service.submit(spec)
