@@ -28,7 +28,7 @@ EXAMPLES = ("one_pendulum.json", "two_pendulums.toml", "measured_clutch.json")
 DESKTOP, TABLET = (1280, 900), (820, 1100)
 #: Colours of a picture; pages have few.
 COLOURS = 96
-SECONDS = 300
+SECONDS = 600
 
 
 @contextmanager
@@ -47,7 +47,7 @@ def service(folder: str) -> Iterator[str]:
 def submit(address: str) -> list[str]:
     """Run the examples; their ids."""
     ids = []
-    with httpx.Client(base_url=f"{address}/api/v1", timeout=60.0) as client:
+    with httpx.Client(base_url=f"{address}/api/v1", timeout=SECONDS) as client:
         for name in EXAMPLES:
             path = ROOT / "examples" / name
             kind = "toml" if path.suffix == ".toml" else "json"

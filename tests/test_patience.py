@@ -17,8 +17,8 @@ _THROWS = re.compile(r"(querySelector|getElementById)\([^)]*\)\.")
 
 
 def calls() -> Iterator[tuple[Path, ast.Call, str]]:
-    """Every call of a method in tests and benchmarks, and the method's name."""
-    for path in [*(ROOT / "tests").rglob("*.py"), *(ROOT / "benchmarks").rglob("*.py")]:
+    """Every call of a method in tests, benchmarks and the programs of the docs, and the method's name."""
+    for path in (path for folder in ("tests", "benchmarks", "docs") for path in (ROOT / folder).rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
                 yield path, node, node.func.attr
