@@ -23,6 +23,7 @@ from sprag.service.jobs import checks
 from sprag.service.jobs.submission import take_in
 from sprag.service.json_text import to_bytes
 from sprag.service.reading.limits import span
+from sprag.service.reading.numbers import whole_number
 from sprag.service.reading.quantities import SI
 from sprag.service.reading.reader import CAPTIONS, Choice
 from sprag.service.report import REPORT_FORMATS, Office, report_file
@@ -200,9 +201,10 @@ def _known(views: Mapping[str, View], name: str) -> View:
 def _whole(given: Mapping[str, Any], name: str, low: int, high: int) -> int | None:
     """A whole number of a query within its limits; None where it is not given."""
     text = str(given.get(name, ""))
-    if text and not (text.isdecimal() and low <= int(text) <= high):
+    number = whole_number(text, high + 1)
+    if text and (number is None or number < low):
         raise parameter_error(name, "out-of-range", "must be a whole number", text, span(low, high))
-    return int(text) if text else None
+    return number
 
 
 @contextmanager
@@ -212,6 +214,6 @@ def _refusing() -> Iterator[None]:
         yield
     except (FaultError, StoreError, TransitionError) as error:
         faults: Sequence[Any] = getattr(error, "faults", ())
-        kind = PROBLEM_TYPES.get(cast("Kind", error.code), PROBLEM_TYPES["wrong-state"])
+        kind = PROBLEM_TYPES.get(cast("Kind", error.code), PROBLEM_TYPES["unavailable"])
         document = problem_json(kind, getattr(error, "detail", str(error)), faults)
-        raise RefusedError(kind.status, document | {"type": f"/problems/{error.code}"}) from error
+        raise RefusedError(kind.status, document) from error

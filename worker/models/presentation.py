@@ -177,7 +177,7 @@ class Presentation:
 
     def is_best_small(self, result: str) -> bool:
         """Whether a result is the better the smaller it is, such as an irregularity."""
-        return any(one.result == result and one.kind == "smallest" for one in self.answers)
+        return any(one.result == result and one.better == "smaller" for one in self.answers)
 
     def explained(self, path: str) -> str:
         """Page of docs/ and heading that explain a parameter or another entry of the base; "" where none does."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Final
@@ -75,7 +76,7 @@ def with_own_units(values: Mapping[str, str], reading: Reading) -> Values:
             continue
         for name in ("value",) if unit == "1" else ("value", "within"):
             number = parse_number(in_language(values.get(f"{row}/{name}", "")))
-            if number is not None:
+            if number is not None and math.isfinite(number):
                 shown[f"{row}/{name}"] = exact_quantity(number, unit, "%" if unit == "1" else unit)
     return shown
 

@@ -23,7 +23,7 @@ from sprag.service.reading.numbers import parse_number
 from sprag.service.reading.part_names import lower_first
 from sprag.service.reading.printed import could_be_several
 from sprag.service.reading.together import with_last_unit
-from sprag.service.reading.units import QuantityError, parse_quantity
+from sprag.service.reading.units import QuantityError, parse_quantity, split_typed
 from sprag.service.reading.wording import unit_text
 from sprag.service.spec.measured import MeasuredDataError, parse_measured
 from sprag.worker.models.form import FormChoice, FormField
@@ -267,11 +267,11 @@ def _measured_text(rows: Sequence[Sequence[Any]]) -> str:
 def _column(cells: Sequence[Any], name: str, si: str) -> list[str]:
     """Heading and numbers of a column of quantities."""
     numbers = [_si(cell, si) for cell in cells]
-    parts = [cell.strip().partition(" ") for cell in cells if isinstance(cell, str)]
-    units = {unit.strip() for _number, _blank, unit in parts}
-    if len(parts) == len(cells) and len(units) == 1 and (unit := units.pop()):
-        typed = [number for number, _blank, _unit in parts]
-        if all(parse_number(text) is not None for text in typed):
+    units = {split_typed(cell)[1] if isinstance(cell, str) else "" for cell in cells}
+    if len(units) == 1 and (unit := units.pop()):
+        typed = [cell.strip().removesuffix(unit).strip() for cell in cells]
+        # A blank that separates thousands could be read as the end of a cell.
+        if all(parse_number(text) is not None and len(text.split()) == 1 for text in typed):
             return [f"{name} [{unit}]", *typed]
     return [f"{name}_{si.replace('*', '')}", *map(repr, numbers)]
 

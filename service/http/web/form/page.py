@@ -206,9 +206,9 @@ async def send_form(context: Ctx, work: Attended, request: Request, values: Form
     """Perform the pressed button: check the form, add or remove parts, or submit the study."""
     wanted = values.pop("do", "check")
     if wanted == "undo":
-        with_shown_units(values, _reading(values))
         undo(values)
         settle(values, with_ticks=False)
+        with_shown_units(values, _reading(values))  # what was typed before is in the shown units too
         return await in_thread(form_page, request, values, await look_over(context, work, values))
     before, kinds = values, changed_kinds(values)
     if "/text" not in values:

@@ -182,3 +182,14 @@ def test_limits_are_named_and_taken_in_the_units_of_the_reader(service: Service)
     rendered |= {"/goal/subject_to/1/value": "25"}
     with_shown_units(rendered, reading)
     assert parse_spec(spec_of(rendered)[0]).study.plan == parse_spec(searching(subject_to=limits)).study.plan
+
+
+def test_undo_takes_limits_in_the_units_in_which_they_were_typed(service: Service) -> None:
+    limits = [{"result": "shaft.speed.mean", "at_most": 8}]
+    field = "/goal/subject_to/0/value"
+    sent = {**empty("vibration-drive"), **values_of(searching(subject_to=limits)), "do": "undo", field: "400"}
+    for before, now in (("300", "300 rpm"), ("300 rad/s", "300 rad/s"), ("inf", "inf"), ("1e400", "1e400")):
+        history = json.dumps([{field: before}])
+        answer = service.http.post("/new", data={**sent, "history": history})
+        assert answer.status_code == 200
+        assert Controls(answer.text).values[field].startswith(now)

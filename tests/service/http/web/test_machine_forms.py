@@ -114,6 +114,22 @@ def test_fields_of_older_drafts_are_read(service: Service) -> None:
     ]
 
 
+@pytest.mark.parametrize("text", ["{} 250 N*mm", "{}\N{NARROW NO-BREAK SPACE}250 N*mm", "{}250N*mm", "{} 000 N*mm"])
+def test_measured_numbers_with_groups_of_digits_stay_what_they_are(text: str) -> None:
+    spec = json.loads((EXAMPLES / "measured_clutch.json").read_text(encoding="utf-8"))
+    rows = [[f"{degrees}deg", text.format(10 * degrees)] for degrees in range(1, 10)]
+    spec["base"]["pendulums"][0]["clutch"] |= {"data": rows, "accuracy": "1e6 N*m"}
+    again = spec_of(values_of(spec))[0]
+    torques = [clutch_law(each) for each in (spec, again)]
+    assert torques[1] == pytest.approx(torques[0], rel=1e-9)
+
+
+def clutch_law(spec: dict[str, Any]) -> dict[str, float]:
+    """The fitted law of the clutch."""
+    base = parse_spec(spec).study.base
+    return {path: value for path, value in base.items() if ".clutch." in path}
+
+
 def test_measured_rows_are_taken_over_as_they_were_typed() -> None:
     spec = json.loads((EXAMPLES / "measured_clutch.json").read_text(encoding="utf-8"))
     values = values_of(spec)
