@@ -8,10 +8,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from sprag.worker.models import ChunkResult
-from sprag.worker.ports import Chunk, Fate, Outcome
-from sprag.worker.reports import ExecutorReport
-from sprag.worker.study import Study
+from sprag_study.worker.models import ChunkResult
+from sprag_study.worker.ports import Chunk, Fate, Outcome
+from sprag_study.worker.reports import ExecutorReport
+from sprag_study.worker.study import Study
 
 T = TypeVar("T")
 

@@ -15,17 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.workloads import W1
-from sprag.engine.continuation.follow import Range
-from sprag.engine.continuation.problem import Kind
-from sprag.engine.run import SettledRun
-from sprag.engine.vibration_drive.branches import DriveBranch, branch
-from sprag.engine.vibration_drive.cases import case_matrix, with_lengths
-from sprag.engine.vibration_drive.integration import integrate
-from sprag.engine.vibration_drive.kernel import kernel_of
-from sprag.engine.vibration_drive.regimes import settled_infos
-from sprag.engine.vibration_drive.results import orbit_infos
-from sprag.engine.vibration_drive.settle import settle
-from sprag.engine.vibration_drive.strobes import BEGIN, SHAFT_SPEED
+from sprag_study.engine.continuation.follow import Range
+from sprag_study.engine.continuation.problem import Kind
+from sprag_study.engine.run import SettledRun
+from sprag_study.engine.vibration_drive.branches import DriveBranch, branch
+from sprag_study.engine.vibration_drive.cases import case_matrix, with_lengths
+from sprag_study.engine.vibration_drive.integration import integrate
+from sprag_study.engine.vibration_drive.kernel import kernel_of
+from sprag_study.engine.vibration_drive.regimes import settled_infos
+from sprag_study.engine.vibration_drive.results import orbit_infos
+from sprag_study.engine.vibration_drive.settle import settle
+from sprag_study.engine.vibration_drive.strobes import BEGIN, SHAFT_SPEED
 
 SETTINGS = SettledRun()
 #: Distance (N*m) from the doubling at which brute force starts on the orbit, and its periods.

@@ -28,14 +28,14 @@ from numpy.typing import NDArray
 from scipy.stats import binom
 
 from benchmarks.workloads import CASES, PERIODS, W1, W2, Workload, cores, pin
-from sprag.engine.compile.jit import inlined
-from sprag.engine.run import Run, SettledRun
-from sprag.engine.vibration_drive import kernel as kernels_of_engine
-from sprag.engine.vibration_drive.kernel import source
-from sprag.engine.vibration_drive.layout import make_layout
-from sprag.engine.vibration_drive.results import result_infos
-from sprag.engine.vibration_drive.settle import settle
-from sprag.engine.vibration_drive.simulate import simulate
+from sprag_study.engine.compile.jit import inlined
+from sprag_study.engine.run import Run, SettledRun
+from sprag_study.engine.vibration_drive import kernel as kernels_of_engine
+from sprag_study.engine.vibration_drive.kernel import source
+from sprag_study.engine.vibration_drive.layout import make_layout
+from sprag_study.engine.vibration_drive.results import result_infos
+from sprag_study.engine.vibration_drive.settle import settle
+from sprag_study.engine.vibration_drive.simulate import simulate
 
 Ints = NDArray[np.int64]
 
@@ -54,7 +54,7 @@ _TICKS = len(STAGES) + 3
 
 #: Anchors in the source of a kernel, each of which occurs once, and their replacements.
 _READINGS = (
-    ("from sprag.engine.vibration_drive.window import", "from benchmarks.breakdown import read\n{anchor}"),
+    ("from sprag_study.engine.vibration_drive.window import", "from benchmarks.breakdown import read\n{anchor}"),
     ("since, pieces,\n):", "since, pieces, ticks,\n):"),
     ("    busy = 0  # bit k", "    read(ticks, 0)\n{anchor}"),
     (

@@ -16,16 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.workloads import W1
-from sprag.engine import Run, Span
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.run import SettledRun
-from sprag.engine.vibration_drive.regimes import settled_infos
-from sprag.engine.vibration_drive.results import result_infos
-from sprag.engine.vibration_drive.settle import settle
-from sprag.engine.vibration_drive.simulate import simulate
-from sprag.worker.planning.calibrate import CalibratePlan, CalibratePlanner, Measured, Unknown
-from sprag.worker.planning.calibrate.answer import answer
-from sprag.worker.planning.rounds import Rows
+from sprag_study.engine import Run, Span
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.run import SettledRun
+from sprag_study.engine.vibration_drive.regimes import settled_infos
+from sprag_study.engine.vibration_drive.results import result_infos
+from sprag_study.engine.vibration_drive.settle import settle
+from sprag_study.engine.vibration_drive.simulate import simulate
+from sprag_study.worker.planning.calibrate import CalibratePlan, CalibratePlanner, Measured, Unknown
+from sprag_study.worker.planning.calibrate.answer import answer
+from sprag_study.worker.planning.rounds import Rows
 
 Floats = NDArray[np.float64]
 

@@ -23,12 +23,12 @@ from pathlib import Path
 import numpy as np
 from distributed import Client, LocalCluster
 
-from sprag.service.storage.store import Store
-from sprag.worker import models
-from sprag.worker.chunking import Chunking
-from sprag.worker.models import ChunkResult
-from sprag.worker.ports import Finished
-from sprag.worker.study import Axis, Study
+from sprag_study.service.storage.store import Store
+from sprag_study.worker import models
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.models import ChunkResult
+from sprag_study.worker.ports import Finished
+from sprag_study.worker.study import Axis, Study
 
 #: Bytes/s of the dispatcher's link: 10 Gbit/s.
 LINK = 1.25e9

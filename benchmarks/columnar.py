@@ -23,12 +23,12 @@ import pyarrow.parquet as pq
 
 from benchmarks.at_once import timed
 from benchmarks.ten_million import CHUNK, INNER, study_of, values_of
-from sprag.service.storage.database.private_files import sync_folder
-from sprag.service.storage.store import Store
-from sprag.worker import models
-from sprag.worker.chunking import Chunking
-from sprag.worker.models import ChunkResult
-from sprag.worker.ports import Finished
+from sprag_study.service.storage.database.private_files import sync_folder
+from sprag_study.service.storage.store import Store
+from sprag_study.worker import models
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.models import ChunkResult
+from sprag_study.worker.ports import Finished
 
 INFOS = models.result_infos("vibration-drive", "1")
 NAMES = [info.column for info in INFOS]

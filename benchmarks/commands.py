@@ -13,9 +13,9 @@ import sys
 
 COMMANDS = {
     "python -c pass": ["-c", "pass"],
-    "sprag --version": ["-m", "sprag.service.cli", "--version"],
-    "sprag --help": ["-m", "sprag.service.cli", "--help"],
-    "sprag run --help": ["-m", "sprag.service.cli", "run", "--help"],
+    "sprag --version": ["-m", "sprag_study.service.cli", "--version"],
+    "sprag --help": ["-m", "sprag_study.service.cli", "--help"],
+    "sprag run --help": ["-m", "sprag_study.service.cli", "run", "--help"],
 }
 
 

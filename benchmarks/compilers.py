@@ -20,7 +20,7 @@ WAYS = ("programs", "plain")
 DRIVE = """
 import sys
 import numpy as np
-from sprag.engine.vibration_drive.simulate import simulate
+from sprag_study.engine.vibration_drive.simulate import simulate
 from tests.engine.vibration_drive.drive import batch_of, drive, periods
 
 loads = np.linspace(0.0, 0.4, 40)

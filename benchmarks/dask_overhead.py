@@ -13,12 +13,12 @@ import statistics
 import time
 
 from benchmarks.overhead import example
-from sprag.service.settings import available_cores
-from sprag.worker import models
-from sprag.worker.executors.dask import DaskExecutor
-from sprag.worker.executors.process_pool import ProcessPoolExecutor
-from sprag.worker.ports import Chunk, Executor, Fate
-from sprag.worker.study import Study
+from sprag_study.service.settings import available_cores
+from sprag_study.worker import models
+from sprag_study.worker.executors.dask import DaskExecutor
+from sprag_study.worker.executors.process_pool import ProcessPoolExecutor
+from sprag_study.worker.ports import Chunk, Executor, Fate
+from sprag_study.worker.study import Study
 
 
 def load(executor: Executor, study: Study, processes: int) -> None:

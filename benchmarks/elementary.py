@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine import elementary
+from sprag_study.engine import elementary
 
 Floats = NDArray[np.float64]
 

@@ -17,15 +17,15 @@ from time import perf_counter
 import numpy as np
 
 from benchmarks.reading import build, grid
-from sprag.service.figures.explore import explore_figure
-from sprag.service.http.web.rows.view import rows_view
-from sprag.service.json_text import to_bytes
-from sprag.service.reading.reader import Choice
-from sprag.service.results.explore import ExploreQuery, explore, explored_json, plan_of
-from sprag.service.storage.store import Store
-from sprag.service.views.column_files import ColumnFiles
-from sprag.service.views.columns import Columns
-from sprag.service.views.library import Library
+from sprag_study.service.figures.explore import explore_figure
+from sprag_study.service.http.web.rows.view import rows_view
+from sprag_study.service.json_text import to_bytes
+from sprag_study.service.reading.reader import Choice
+from sprag_study.service.results.explore import ExploreQuery, explore, explored_json, plan_of
+from sprag_study.service.storage.store import Store
+from sprag_study.service.views.column_files import ColumnFiles
+from sprag_study.service.views.columns import Columns
+from sprag_study.service.views.library import Library
 
 
 def timed(what: str, work: Callable[[], object], unit: float | None = None) -> float:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pandas as pd
 
-import sprag
+import sprag_study as sprag
 from benchmarks.at_once import timed
 from benchmarks.reading import build, grid, serving
 

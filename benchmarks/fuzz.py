@@ -15,10 +15,10 @@ from pathlib import Path
 import httpx
 from pydantic import SecretStr
 
-from sprag.service.http import attempts
-from sprag.service.http.app import chunking, create_app
-from sprag.service.settings import Settings
-from sprag.service.storage.store import Store
+from sprag_study.service.http import attempts
+from sprag_study.service.http.app import chunking, create_app
+from sprag_study.service.settings import Settings
+from sprag_study.service.storage.store import Store
 from tests.service.conftest import InThread, Service
 from tests.service.http.fuzzing import fuzz, with_ids
 from tests.service.http.test_fuzzing import TOKEN, things

@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 
 from benchmarks.peers.searches import Found, Problem, cmaes_evaluations, optuna_nsga2, pymoo_nsga2
 from benchmarks.workloads import W1
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.run import SettledRun
-from sprag.engine.vibration_drive.regimes import settled_infos
-from sprag.engine.vibration_drive.settle import settle
-from sprag.worker.planning.goals import Goal, GoalPlan, GoalPlanner, Limit, Variable, front
-from sprag.worker.planning.goals.hypervolume import hypervolume
-from sprag.worker.planning.rounds import Rows
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.run import SettledRun
+from sprag_study.engine.vibration_drive.regimes import settled_infos
+from sprag_study.engine.vibration_drive.settle import settle
+from sprag_study.worker.planning.goals import Goal, GoalPlan, GoalPlanner, Limit, Variable, front
+from sprag_study.worker.planning.goals.hypervolume import hypervolume
+from sprag_study.worker.planning.rounds import Rows
 
 Floats = NDArray[np.float64]
 Values = dict[str, Floats]

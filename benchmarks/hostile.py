@@ -26,7 +26,7 @@ import psutil
 
 from benchmarks.faults.harness import PATIENCE, Service, until
 from benchmarks.hostile_readers import measure
-from sprag.service.presets import preset_text
+from sprag_study.service.presets import preset_text
 
 _LEAVE = 5.0
 _STAY = PATIENCE

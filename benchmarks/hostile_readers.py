@@ -26,10 +26,10 @@ import httpx
 
 from benchmarks.faults.harness import PATIENCE, Service, spec, until
 from benchmarks.reading import build, grid
-from sprag.service.formats import FORMATS
-from sprag.service.storage.database.sqlite_files import sqlite_driver
-from sprag.service.storage.people.scopes import TokenScope
-from sprag.service.storage.store import Store
+from sprag_study.service.formats import FORMATS
+from sprag_study.service.storage.database.sqlite_files import sqlite_driver
+from sprag_study.service.storage.people.scopes import TokenScope
+from sprag_study.service.storage.store import Store
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -18,7 +18,7 @@ import numpy as np
 
 from benchmarks.peers.sprag_drive import SpragDrive
 from benchmarks.workloads import CASES, REFERENCE, W1, W2, Workload, cores, errors, load_reference, pin, take_turns
-from sprag.engine.vibration_drive import simulate as module
+from sprag_study.engine.vibration_drive import simulate as module
 
 TOLERANCE = 1e-9
 LANES = (8, 16, 24, 32, 40, 48, 56)

@@ -19,14 +19,14 @@ from time import process_time
 import numpy as np
 import sqlalchemy as sa
 
-from sprag.service.storage.rows.case_keys import add_keys
-from sprag.service.storage.store import Store
-from sprag.service.storage.studies.study_row import study_row
-from sprag.service.storage.tables import STUDIES
-from sprag.worker import fingerprint
-from sprag.worker.case_keys import case_keys
-from sprag.worker.chunking import Chunking
-from sprag.worker.study import Axis, Study
+from sprag_study.service.storage.rows.case_keys import add_keys
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.studies.study_row import study_row
+from sprag_study.service.storage.tables import STUDIES
+from sprag_study.worker import fingerprint
+from sprag_study.worker.case_keys import case_keys
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.study import Axis, Study
 from tests.worker import fakes
 
 #: The part of the studies beside which a search by comparing is measured.

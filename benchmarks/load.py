@@ -19,7 +19,7 @@ from urllib.parse import urlsplit
 import httpx
 
 from benchmarks.faults.harness import PATIENCE
-from sprag.service.http.api.examples import SPEC
+from sprag_study.service.http.api.examples import SPEC
 from tests.acceptance.processes import service
 
 SLOW, STREAMS, CLIENTS = 200, 50, 16

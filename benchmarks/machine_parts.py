@@ -16,10 +16,10 @@ from collections import defaultdict
 
 import numpy as np
 
-from sprag.engine.machine_shaft.estimate import estimate_seconds
-from sprag.engine.machine_shaft.results import result_infos
-from sprag.engine.machine_shaft.simulate import simulate
-from sprag.engine.machine_shaft.spec import MachineSpec
+from sprag_study.engine.machine_shaft.estimate import estimate_seconds
+from sprag_study.engine.machine_shaft.results import result_infos
+from sprag_study.engine.machine_shaft.simulate import simulate
+from sprag_study.engine.machine_shaft.spec import MachineSpec
 from tests.engine.machine_shaft import independent, random_machines
 from tests.engine.machine_shaft.machines import PRESS_NUMBERS
 from tests.engine.machine_shaft.test_parts import PRESS_PART, engine_machine, in_part, of_shaft

@@ -18,13 +18,13 @@ from typing import Any
 
 import numpy as np
 
-from sprag.engine.machine_shaft.estimate import estimate_seconds
-from sprag.engine.machine_shaft.simulate import simulate
-from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
-from sprag.engine.machine_shaft.tables import Table
-from sprag.service.jobs.local import run_here
-from sprag.service.spec.document import parse_spec
-from sprag.worker import models
+from sprag_study.engine.machine_shaft.estimate import estimate_seconds
+from sprag_study.engine.machine_shaft.simulate import simulate
+from sprag_study.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
+from sprag_study.engine.machine_shaft.tables import Table
+from sprag_study.service.jobs.local import run_here
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.worker import models
 
 PRESS = MachineSpec(
     mechanism=MechanismChoice("slider_crank"), operation=OperationChoice("force", "steps", steps=1), balance="constant"

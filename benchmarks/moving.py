@@ -13,10 +13,10 @@ import tempfile
 from pathlib import Path
 
 from benchmarks.storing import Meter, at_once, by_psql, numbers, study_of, through_the_dispatcher
-from sprag.service.storage.database.session import Session
-from sprag.service.storage.moving import move
-from sprag.service.storage.store import Store
-from sprag.worker.chunking import Chunking
+from sprag_study.service.storage.database.session import Session
+from sprag_study.service.storage.moving import move
+from sprag_study.service.storage.store import Store
+from sprag_study.worker.chunking import Chunking
 from tests import postgres
 
 #: Cases of a chunk.

@@ -19,12 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.settled import random_drives
-from sprag.engine.run import Run, SettledRun, Span
-from sprag.engine.vibration_drive.regimes import Regime, settled_infos
-from sprag.engine.vibration_drive.results import result_infos
-from sprag.engine.vibration_drive.settle import settle
-from sprag.engine.vibration_drive.simulate import simulate
-from sprag.engine.vibration_drive.transients import OFF, simulate_judged
+from sprag_study.engine.run import Run, SettledRun, Span
+from sprag_study.engine.vibration_drive.regimes import Regime, settled_infos
+from sprag_study.engine.vibration_drive.results import result_infos
+from sprag_study.engine.vibration_drive.settle import settle
+from sprag_study.engine.vibration_drive.simulate import simulate
+from sprag_study.engine.vibration_drive.transients import OFF, simulate_judged
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

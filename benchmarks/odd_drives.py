@@ -12,7 +12,7 @@ from collections import Counter
 
 import numpy as np
 
-from sprag.engine.endings import Ending
+from sprag_study.engine.endings import Ending
 from tests.engine.odd_drives import idle_drive, odd_drive
 from tests.engine.vibration_drive.drive import Columns, Results, batch_of, periods
 

@@ -25,8 +25,8 @@ _HERE: Final = Path(__file__).resolve().parent.parent
 _COMPUTE: Final = """
 import json, sys, time
 sys.path.insert(0, "")
-from sprag.service.spec.document import parse_spec
-from sprag.worker import models
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.worker import models
 for line in sys.stdin:
     spec = json.loads(line)
     study = parse_spec(spec).study

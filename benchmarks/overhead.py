@@ -21,15 +21,15 @@ from typing import Any
 
 import psutil
 
-from sprag.service.jobs.dispatching import WorkerSettings, start_dispatcher_process
-from sprag.service.presets import preset_text
-from sprag.service.settings import available_cores
-from sprag.service.spec.document import load_spec, parse_spec
-from sprag.service.storage.store import Store
-from sprag.worker import models
-from sprag.worker.chunking import Chunking, spans
-from sprag.worker.pool.processes import single_threaded_children
-from sprag.worker.study import Axis, Study
+from sprag_study.service.jobs.dispatching import WorkerSettings, start_dispatcher_process
+from sprag_study.service.presets import preset_text
+from sprag_study.service.settings import available_cores
+from sprag_study.service.spec.document import load_spec, parse_spec
+from sprag_study.service.storage.store import Store
+from sprag_study.worker import models
+from sprag_study.worker.chunking import Chunking, spans
+from sprag_study.worker.pool.processes import single_threaded_children
+from sprag_study.worker.study import Axis, Study
 
 #: The times are those in the database; looking more often would only take a core from the pool.
 _POLL_SECONDS = 0.1

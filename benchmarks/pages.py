@@ -19,12 +19,12 @@ import numpy as np
 
 from benchmarks.faults.harness import PATIENCE
 from benchmarks.reading import serving
-from sprag.service.http.api.examples import SPEC
-from sprag.service.spec.document import parse_spec
-from sprag.service.storage.store import Store
-from sprag.worker import models
-from sprag.worker.chunking import Chunking
-from sprag.worker.models import ChunkResult
+from sprag_study.service.http.api.examples import SPEC
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.storage.store import Store
+from sprag_study.worker import models
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.models import ChunkResult
 
 _CURVE = 100_000
 #: One case in so many ends otherwise than ok.

@@ -24,7 +24,7 @@ import llvmlite.binding as llvm
 import numpy as np
 
 from benchmarks.workloads import CASES, W1, W2, Workload
-from sprag.engine.run import Run, SettledRun, Span
+from sprag_study.engine.run import Run, SettledRun, Span
 
 ROOT = Path(__file__).resolve().parents[1]
 _WORKLOADS = {workload.name: workload for workload in (W1, W2)}
@@ -66,8 +66,8 @@ def codes(plain: bool) -> dict[str, dict[str, str]]:
 
 def _bits(workload: Workload, settled: bool) -> str:
     """A hash of all results of some cases, computed in batches of several sizes, which must agree."""
-    from sprag.engine.vibration_drive.settle import settle
-    from sprag.engine.vibration_drive.simulate import simulate
+    from sprag_study.engine.vibration_drive.settle import settle
+    from sprag_study.engine.vibration_drive.simulate import simulate
 
     cases = np.arange(0, CASES, CASES // _COMPARED)[:_COMPARED]
     # Long enough for every event; few orbits are that quick.
@@ -88,9 +88,9 @@ def _bits(workload: Workload, settled: bool) -> str:
 
 def _bits_of_presets() -> dict[str, str]:
     """Hashes of the results of the first cases of every preset, by its name."""
-    from sprag.service.presets import preset_names, preset_text
-    from sprag.service.spec.document import load_spec, parse_spec
-    from sprag.worker import models
+    from sprag_study.service.presets import preset_names, preset_text
+    from sprag_study.service.spec.document import load_spec, parse_spec
+    from sprag_study.worker import models
 
     found = {}
     for name in preset_names():
@@ -103,7 +103,7 @@ def _bits_of_presets() -> dict[str, str]:
 
 
 def _answer(question: list[Any]) -> Any:
-    from sprag.engine.vibration_drive.simulate import simulate
+    from sprag_study.engine.vibration_drive.simulate import simulate
 
     if question[0] == "presets":
         return _bits_of_presets()

@@ -25,14 +25,14 @@ import httpx
 import numpy as np
 
 from benchmarks.faults.harness import COMMAND, PATIENCE, environment, kill_family, until
-from sprag.service.formats import FORMATS
-from sprag.service.presets import preset_text
-from sprag.service.spec.document import load_spec, parse_spec
-from sprag.service.storage.store import Store
-from sprag.worker import models
-from sprag.worker.chunking import Chunking
-from sprag.worker.models import ChunkResult
-from sprag.worker.study import Axis, Study
+from sprag_study.service.formats import FORMATS
+from sprag_study.service.presets import preset_text
+from sprag_study.service.spec.document import load_spec, parse_spec
+from sprag_study.service.storage.store import Store
+from sprag_study.worker import models
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.models import ChunkResult
+from sprag_study.worker.study import Axis, Study
 
 #: Requests to each kind of answer before those that count.
 _WARM = 20

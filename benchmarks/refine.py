@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.refine_problems import Problem, families
-from sprag.worker.planning.refine import Curve, CurveRefiner, describe
-from sprag.worker.planning.refine_plan import RefinePlan
-from sprag.worker.planning.rounds import Rows
+from sprag_study.worker.planning.refine import Curve, CurveRefiner, describe
+from sprag_study.worker.planning.refine_plan import RefinePlan
+from sprag_study.worker.planning.rounds import Rows
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

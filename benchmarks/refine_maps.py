@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.refine_problems import Problem, maps
-from sprag.worker.planning.refine import Map, MapRefiner
-from sprag.worker.planning.refine_plan import RefinePlan
+from sprag_study.worker.planning.refine import Map, MapRefiner
+from sprag_study.worker.planning.refine_plan import RefinePlan
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.service.presets import preset_text
-from sprag.service.spec.document import format_of, load_spec, parse_spec
-from sprag.worker import models
-from sprag.worker.planning.refine_plan import AdaptiveAxis, RefinePlan, half_widths_of
-from sprag.worker.planning.rounds import Rows
-from sprag.worker.study import Axis, Study
+from sprag_study.service.presets import preset_text
+from sprag_study.service.spec.document import format_of, load_spec, parse_spec
+from sprag_study.worker import models
+from sprag_study.worker.planning.refine_plan import AdaptiveAxis, RefinePlan, half_widths_of
+from sprag_study.worker.planning.rounds import Rows
+from sprag_study.worker.study import Axis, Study
 
 Floats = NDArray[np.float64]
 

@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from sprag.service.figures.figure import Figure, Line, Panel, Quantity, line_colours
-from sprag.service.figures.pictures import picture_file
-from sprag.service.figures.svg import picture_svg, svg
+from sprag_study.service.figures.figure import Figure, Line, Panel, Quantity, line_colours
+from sprag_study.service.figures.pictures import picture_file
+from sprag_study.service.figures.svg import picture_svg, svg
 
 LOAD, SPEED = Quantity("Load torque", "N*m"), Quantity("Mean shaft speed", "rpm")
 X = np.linspace(0.0, 1.6, 60)

@@ -20,16 +20,16 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from sprag.service.presets import preset_text
-from sprag.service.spec.document import load_spec, parse_spec
-from sprag.service.storage.part import SystemClock
-from sprag.service.storage.store import Store
-from sprag.service.storage.work.work import Work
-from sprag.worker import models
-from sprag.worker.dispatcher import Dispatcher
-from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.limits import MAX_PLANNED_CASES
-from sprag.worker.rounds import Rounds
+from sprag_study.service.presets import preset_text
+from sprag_study.service.spec.document import load_spec, parse_spec
+from sprag_study.service.storage.part import SystemClock
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.work.work import Work
+from sprag_study.worker import models
+from sprag_study.worker.dispatcher import Dispatcher
+from sprag_study.worker.executors.inline import InlineExecutor
+from sprag_study.worker.limits import MAX_PLANNED_CASES
+from sprag_study.worker.rounds import Rounds
 
 P = ParamSpec("P")
 T = TypeVar("T")

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.faults.harness import COMMAND, environment
-from sprag.service.presets import preset_text
+from sprag_study.service.presets import preset_text
 
 #: Processes, cases of a chunk, and further options.
 Cut = tuple[int, int, tuple[str, ...]]

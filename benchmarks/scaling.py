@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.workloads import CASES, W1, Workload, cores, many_pendulums, pin, take_turns
-from sprag.engine.run import Run
-from sprag.engine.vibration_drive.results import result_infos
-from sprag.engine.vibration_drive.simulate import simulate
+from sprag_study.engine.run import Run
+from sprag_study.engine.vibration_drive.results import result_infos
+from sprag_study.engine.vibration_drive.simulate import simulate
 
 _STEPS = [info.name for info in result_infos(1)].index("run.steps")
 

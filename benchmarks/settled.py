@@ -18,17 +18,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.workloads import CASES, W1, W2
-from sprag.engine.run import Run, SettledRun
-from sprag.engine.vibration_drive import orbits
-from sprag.engine.vibration_drive.cases import case_matrix, pendulum_count, with_lengths
-from sprag.engine.vibration_drive.characteristics import characteristics, combined
-from sprag.engine.vibration_drive.integration import Integration, integrate
-from sprag.engine.vibration_drive.kernel import kernel_of
-from sprag.engine.vibration_drive.regimes import Regime, means, settled_infos
-from sprag.engine.vibration_drive.results import result_infos
-from sprag.engine.vibration_drive.settle import SettledBatch, settle
-from sprag.engine.vibration_drive.simulate import simulate
-from sprag.engine.vibration_drive.strobes import SHAFT_SPEED
+from sprag_study.engine.run import Run, SettledRun
+from sprag_study.engine.vibration_drive import orbits
+from sprag_study.engine.vibration_drive.cases import case_matrix, pendulum_count, with_lengths
+from sprag_study.engine.vibration_drive.characteristics import characteristics, combined
+from sprag_study.engine.vibration_drive.integration import Integration, integrate
+from sprag_study.engine.vibration_drive.kernel import kernel_of
+from sprag_study.engine.vibration_drive.regimes import Regime, means, settled_infos
+from sprag_study.engine.vibration_drive.results import result_infos
+from sprag_study.engine.vibration_drive.settle import SettledBatch, settle
+from sprag_study.engine.vibration_drive.simulate import simulate
+from sprag_study.engine.vibration_drive.strobes import SHAFT_SPEED
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -23,8 +23,8 @@ def _child(pendulums: int) -> dict[str, float]:
     start = time.perf_counter()
     from numba.core import event
 
-    from sprag.engine.run import Run
-    from sprag.engine.vibration_drive.simulate import simulate
+    from sprag_study.engine.run import Run
+    from sprag_study.engine.vibration_drive.simulate import simulate
 
     imported = time.perf_counter()
     import numpy as np

@@ -28,10 +28,10 @@ from numpy.typing import NDArray
 
 from benchmarks.starts_long import Motions, long_motions
 from benchmarks.workloads import CASES, W1
-from sprag.engine.run import SettledRun
-from sprag.engine.vibration_drive.start_results import started_infos
-from sprag.engine.vibration_drive.starts import StartedBatch, settle_starts, started_columns
-from sprag.service.spec.kinds.starts import drawn
+from sprag_study.engine.run import SettledRun
+from sprag_study.engine.vibration_drive.start_results import started_infos
+from sprag_study.engine.vibration_drive.starts import StartedBatch, settle_starts, started_columns
+from sprag_study.service.spec.kinds.starts import drawn
 
 Ints = NDArray[np.int64]
 

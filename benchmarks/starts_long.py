@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.run import Run
-from sprag.engine.vibration_drive.cases import Column, case_matrix, with_lengths
-from sprag.engine.vibration_drive.integration import integrate
-from sprag.engine.vibration_drive.kernel import kernel_of
-from sprag.engine.vibration_drive.layout import OUT_ENDING
-from sprag.engine.vibration_drive.strobes import ANGLE, SHAFT_SPEED, SHAFT_WIDTH, SPEED, TURN
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.run import Run
+from sprag_study.engine.vibration_drive.cases import Column, case_matrix, with_lengths
+from sprag_study.engine.vibration_drive.integration import integrate
+from sprag_study.engine.vibration_drive.kernel import kernel_of
+from sprag_study.engine.vibration_drive.layout import OUT_ENDING
+from sprag_study.engine.vibration_drive.strobes import ANGLE, SHAFT_SPEED, SHAFT_WIDTH, SPEED, TURN
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

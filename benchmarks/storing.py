@@ -30,17 +30,17 @@ import sqlalchemy as sa
 from sqlalchemy.engine import make_url
 
 from benchmarks.at_once import AtOnce
-from sprag.service.storage.database import blocks
-from sprag.service.storage.database.sqlite_files import sqlite_driver
-from sprag.service.storage.part import SystemClock
-from sprag.service.storage.store import Store
-from sprag.service.storage.studies.records import StudyRecord
-from sprag.service.storage.tables import results_table
-from sprag.service.storage.work import work
-from sprag.worker import fingerprint, models
-from sprag.worker.chunking import Chunking
-from sprag.worker.dispatcher import Dispatcher
-from sprag.worker.study import Axis, Study
+from sprag_study.service.storage.database import blocks
+from sprag_study.service.storage.database.sqlite_files import sqlite_driver
+from sprag_study.service.storage.part import SystemClock
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.studies.records import StudyRecord
+from sprag_study.service.storage.tables import results_table
+from sprag_study.service.storage.work import work
+from sprag_study.worker import fingerprint, models
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.dispatcher import Dispatcher
+from sprag_study.worker.study import Axis, Study
 from tests import postgres
 from tests.worker import fakes
 

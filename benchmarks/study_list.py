@@ -15,10 +15,10 @@ from time import perf_counter
 
 import sqlalchemy as sa
 
-from sprag.service.storage.store import Store
-from sprag.service.storage.studies.listing import StudyFilter, StudyOrder, search_text
-from sprag.service.storage.tables import STUDIES
-from sprag.worker.chunking import Chunking
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.studies.listing import StudyFilter, StudyOrder, search_text
+from sprag_study.service.storage.tables import STUDIES
+from sprag_study.worker.chunking import Chunking
 from tests.worker import fakes
 
 _WORDS = ("feeder", "Förderer", "press", "Zahnrad", "Kurbel", "slider", "drive", "clutch", "Antrieb", "night")

@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.workloads import W1
-from sprag.engine.run import SettledRun
-from sprag.engine.vibration_drive.regimes import settled_infos
-from sprag.engine.vibration_drive.settle import settle
-from sprag.engine.vibration_drive.sweep import Begun, Sweep, sweep
-from sprag.service.spec.narrow import narrowed_values
+from sprag_study.engine.run import SettledRun
+from sprag_study.engine.vibration_drive.regimes import settled_infos
+from sprag_study.engine.vibration_drive.settle import settle
+from sprag_study.engine.vibration_drive.sweep import Begun, Sweep, sweep
+from sprag_study.service.spec.narrow import narrowed_values
 
 FINER = 16
 LOW, HIGH = 16.0, 35.0

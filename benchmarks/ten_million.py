@@ -25,15 +25,15 @@ from typing import Any
 import numpy as np
 
 from benchmarks.at_once import AtOnce
-from sprag.service import exports
-from sprag.service.exports.source import stored
-from sprag.service.storage.part import SystemClock
-from sprag.service.storage.store import Store
-from sprag.worker import models
-from sprag.worker.chunking import Chunking
-from sprag.worker.dispatcher import Dispatcher
-from sprag.worker.states import StudyState
-from sprag.worker.study import Axis, Study
+from sprag_study.service import exports
+from sprag_study.service.exports.source import stored
+from sprag_study.service.storage.part import SystemClock
+from sprag_study.service.storage.store import Store
+from sprag_study.worker import models
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.dispatcher import Dispatcher
+from sprag_study.worker.states import StudyState
+from sprag_study.worker.study import Axis, Study
 from tests import postgres
 
 RESULTS = len(models.result_infos("vibration-drive", "1"))

@@ -1,6 +1,6 @@
 """How often the interval of the time left contains the actual time, for studies with different courses of cost.
 
-The estimator is the service's own (`sprag.service.storage.studies.progress`). Chunks of synthetic cost are run on
+The estimator is the service's own (`sprag_study.service.storage.studies.progress`). Chunks of synthetic cost are run on
 simulated processes, in the order of the service; after certain commits the interval is compared with the actual time
 left. With ``--real`` studies of the engine are run here too, and the intervals of ``sprag run`` are used.
 
@@ -22,16 +22,16 @@ from numpy.typing import NDArray
 
 from benchmarks.overhead import timed
 from benchmarks.workloads import W1
-from sprag.engine.run import SettledRun
-from sprag.engine.vibration_drive.settle import settle
-from sprag.service.jobs.local import run_here
-from sprag.service.presets import preset_text
-from sprag.service.spec.document import load_spec, parse_spec
-from sprag.service.storage.studies.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
-from sprag.service.storage.studies.records import Progress
-from sprag.worker.chunking import work_of
-from sprag.worker.order import order_of
-from sprag.worker.study import Axis, Study
+from sprag_study.engine.run import SettledRun
+from sprag_study.engine.vibration_drive.settle import settle
+from sprag_study.service.jobs.local import run_here
+from sprag_study.service.presets import preset_text
+from sprag_study.service.spec.document import load_spec, parse_spec
+from sprag_study.service.storage.studies.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
+from sprag_study.service.storage.studies.records import Progress
+from sprag_study.worker.chunking import work_of
+from sprag_study.worker.order import order_of
+from sprag_study.worker.study import Axis, Study
 
 Costs = NDArray[np.float64]
 

@@ -22,17 +22,17 @@ import httpx
 import numpy as np
 from scipy.stats import norm, qmc
 
-from sprag.service.client import Client
-from sprag.service.results.explore import MOST_SHOWN
-from sprag.service.results.tolerances.quantiles import proportion, quantiles
-from sprag.service.spec.document import parse_spec
-from sprag.service.storage.part import SystemClock
-from sprag.service.storage.store import Store
-from sprag.service.views.drives import RibbonQuery, YieldQuery, both
-from sprag.service.views.library import Library
-from sprag.worker import models
-from sprag.worker.dispatcher import Dispatcher
-from sprag.worker.executors.inline import InlineExecutor
+from sprag_study.service.client import Client
+from sprag_study.service.results.explore import MOST_SHOWN
+from sprag_study.service.results.tolerances.quantiles import proportion, quantiles
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.storage.part import SystemClock
+from sprag_study.service.storage.store import Store
+from sprag_study.service.views.drives import RibbonQuery, YieldQuery, both
+from sprag_study.service.views.library import Library
+from sprag_study.worker import models
+from sprag_study.worker.dispatcher import Dispatcher
+from sprag_study.worker.executors.inline import InlineExecutor
 
 _P = (0.05, 0.5, 0.95)
 _EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "tolerances.json"
@@ -108,7 +108,7 @@ def cost(drives: int, loads: int) -> None:
 def memory(drives: int, loads: int) -> None:
     """Print the largest resident size of every process of a service that runs the study and answers."""
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "sprag.service.cli", "serve", "--json", "--port", "0"]
+        command = [sys.executable, "-m", "sprag_study.service.cli", "serve", "--json", "--port", "0"]
         with subprocess.Popen(
             [*command, "--db", str(Path(folder) / "s.sqlite3")], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
         ) as service:

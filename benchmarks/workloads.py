@@ -56,7 +56,7 @@ class Workload:
         return nu, amplitude, load
 
     def columns(self, cases: Ints) -> dict[str, Floats | float]:
-        """Columns for ``sprag.engine.vibration_drive.simulate``."""
+        """Columns for ``sprag_study.engine.vibration_drive.simulate``."""
         nu, amplitude, load = (axis[cases] for axis in self.grid)
         columns: dict[str, Floats | float] = {
             "gravity": GRAVITY,

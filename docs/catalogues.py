@@ -16,18 +16,18 @@ from typing import Final
 from docs.fault_texts import fault_texts
 from docs.form_texts import form_values
 from docs.vocabulary import units, vocabulary
-from sprag.service import languages
-from sprag.service.cli.app import command_line
-from sprag.service.cli.language import texts as help_texts
-from sprag.service.http.web.script_texts import script_texts
-from sprag.service.http.web.templates import _templates
-from sprag.service.languages.catalogue import Catalogue, Entry, Key, read, written
-from sprag.service.presets import ABOUT
-from sprag.service.reading.wording import NOUNS
+from sprag_study.service import languages
+from sprag_study.service.cli.app import command_line
+from sprag_study.service.cli.language import texts as help_texts
+from sprag_study.service.http.web.script_texts import script_texts
+from sprag_study.service.http.web.templates import _templates
+from sprag_study.service.languages.catalogue import Catalogue, Entry, Key, read, written
+from sprag_study.service.presets import ABOUT
+from sprag_study.service.reading.wording import NOUNS
 
 ROOT: Final = Path(__file__).parent.parent
 #: Where texts stand. What else the worker and the engine say, which know no languages, is in `vocabularies`.
-CODE: Final = ("service", "worker", "engine", "sprag")
+CODE: Final = ("service", "worker", "engine", "sprag_study")
 #: Functions that take a text, and the names of their constant arguments.
 _FUNCTIONS: Final = {
     **dict.fromkeys(("_", "gettext", "N_", "Phrase", "Sentence"), ("text",)),

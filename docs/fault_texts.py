@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-from sprag.service.spec.described import A_LIST, NO_LIST
+from sprag_study.service.spec.described import A_LIST, NO_LIST
 
 _SERVICE: Final = Path(__file__).resolve().parents[1] / "service"
 #: Functions that take the message of a fault, and its place among their arguments.

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from sprag.service.reading.wording import words
-from sprag.service.spec.described import ANY_RUN, DURATION, FIT, SETTLED_RUN
-from sprag.service.spec.draws.described import DISTRIBUTION
-from sprag.service.spec.kinds.goal import GOAL
-from sprag.service.spec.kinds.refine import REFINE
-from sprag.service.spec.kinds.tolerances import DRAWS
-from sprag.service.spec.machine.shaft import MEAN_SPEED_IS
-from sprag.service.spec.machine.shaft_drive import BALANCE, BALANCE_SIDE, FLYWHEEL, MOTOR, STAGE
-from sprag.service.spec.machine.shaft_parts import (
+from sprag_study.service.reading.wording import words
+from sprag_study.service.spec.described import ANY_RUN, DURATION, FIT, SETTLED_RUN
+from sprag_study.service.spec.draws.described import DISTRIBUTION
+from sprag_study.service.spec.kinds.goal import GOAL
+from sprag_study.service.spec.kinds.refine import REFINE
+from sprag_study.service.spec.kinds.tolerances import DRAWS
+from sprag_study.service.spec.machine.shaft import MEAN_SPEED_IS
+from sprag_study.service.spec.machine.shaft_drive import BALANCE, BALANCE_SIDE, FLYWHEEL, MOTOR, STAGE
+from sprag_study.service.spec.machine.shaft_parts import (
     INDICATOR_OVER,
     INTERPOLATION,
     MECHANISM_CHOICES,
@@ -20,9 +20,9 @@ from sprag.service.spec.machine.shaft_parts import (
     OPERATION_CHOICES,
     PHI_C,
 )
-from sprag.worker import models
-from sprag.worker.models.form import Block, Form, FormChoice, FormField
-from sprag.worker.models.laboratory import Laboratory
+from sprag_study.worker import models
+from sprag_study.worker.models.form import Block, Form, FormChoice, FormField
+from sprag_study.worker.models.laboratory import Laboratory
 
 
 def form_values() -> Iterator[str]:

@@ -10,8 +10,8 @@ from typing import Any, Final
 
 import typer
 
-from sprag.service.cli.app import app
-from sprag.service.cli.console import ExitCode
+from sprag_study.service.cli.app import app
+from sprag_study.service.cli.console import ExitCode
 
 FOLDER: Final = Path(__file__).parent / "man"
 #: Of these sources; the installed one may be older.

@@ -17,19 +17,19 @@ import typer
 from fastapi.routing import APIRoute
 
 from docs import manual
-from sprag.engine.formulas.expressions import MAX_LENGTH
-from sprag.engine.vibration_drive.engagements import MAX_PERIODS
-from sprag.service.cli.app import app
-from sprag.service.cli.console import ExitCode
-from sprag.service.cli.settings import VARIABLES
-from sprag.service.fault_meanings import KIND_MEANINGS, MEANINGS, WARNING_MEANINGS
-from sprag.service.http.app import ROUTED
-from sprag.service.http.problems import PROBLEM_TYPES
-from sprag.service.settings import table
-from sprag.worker import limits as limit
-from sprag.worker import models
-from sprag.worker.models import machine_shaft
-from sprag.worker.states import StudyState
+from sprag_study.engine.formulas.expressions import MAX_LENGTH
+from sprag_study.engine.vibration_drive.engagements import MAX_PERIODS
+from sprag_study.service.cli.app import app
+from sprag_study.service.cli.console import ExitCode
+from sprag_study.service.cli.settings import VARIABLES
+from sprag_study.service.fault_meanings import KIND_MEANINGS, MEANINGS, WARNING_MEANINGS
+from sprag_study.service.http.app import ROUTED
+from sprag_study.service.http.problems import PROBLEM_TYPES
+from sprag_study.service.settings import table
+from sprag_study.worker import limits as limit
+from sprag_study.worker import models
+from sprag_study.worker.models import machine_shaft
+from sprag_study.worker.states import StudyState
 
 FOLDER = Path(__file__).parent
 Row = Iterable[str]

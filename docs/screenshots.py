@@ -35,7 +35,7 @@ SECONDS = 600
 def service(folder: str) -> Iterator[str]:
     """A service of its own; its address."""
     database = str(Path(folder) / "pictures.sqlite3")
-    command = [sys.executable, "-m", "sprag.service.cli", "serve", "--json", "--port", "0", "--db", database]
+    command = [sys.executable, "-m", "sprag_study.service.cli", "serve", "--json", "--port", "0", "--db", database]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, cwd=ROOT) as process:
         assert process.stdout is not None
         try:

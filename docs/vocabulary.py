@@ -6,28 +6,28 @@ import re
 from collections.abc import Iterator
 from typing import Final
 
-from sprag.engine.continuation.problem import End
-from sprag.engine.continuation.problem import Kind as Special
-from sprag.engine.vibration_drive.branches import NO_ORBIT
-from sprag.service.actor import Role
-from sprag.service.fault_meanings import KIND_MEANINGS, MEANINGS, WARNING_MEANINGS
-from sprag.service.http.problems import PROBLEM_TYPES
-from sprag.service.http.views import preset_of
-from sprag.service.presets import preset_names
-from sprag.service.reading.quantities import KINDS
-from sprag.service.reading.reader import part_label
-from sprag.service.schedules.outcomes import Result
-from sprag.service.spec.machine.shaft_parts import MECHANISM_CHOICES
-from sprag.service.spec.saved_views import PAGES
-from sprag.service.storage.people.scopes import TokenScope
-from sprag.worker import models
-from sprag.worker.directions import DIRECTIONS
-from sprag.worker.models.machine_shaft import REMARKS
-from sprag.worker.models.model import Model
-from sprag.worker.models.registry import all_models
-from sprag.worker.models.transients import RESULTS as TRANSIENT_RESULTS
-from sprag.worker.models.vocabulary import caption, caption_texts
-from sprag.worker.states import StudyState
+from sprag_study.engine.continuation.problem import End
+from sprag_study.engine.continuation.problem import Kind as Special
+from sprag_study.engine.vibration_drive.branches import NO_ORBIT
+from sprag_study.service.actor import Role
+from sprag_study.service.fault_meanings import KIND_MEANINGS, MEANINGS, WARNING_MEANINGS
+from sprag_study.service.http.problems import PROBLEM_TYPES
+from sprag_study.service.http.views import preset_of
+from sprag_study.service.presets import preset_names
+from sprag_study.service.reading.quantities import KINDS
+from sprag_study.service.reading.reader import part_label
+from sprag_study.service.schedules.outcomes import Result
+from sprag_study.service.spec.machine.shaft_parts import MECHANISM_CHOICES
+from sprag_study.service.spec.saved_views import PAGES
+from sprag_study.service.storage.people.scopes import TokenScope
+from sprag_study.worker import models
+from sprag_study.worker.directions import DIRECTIONS
+from sprag_study.worker.models.machine_shaft import REMARKS
+from sprag_study.worker.models.model import Model
+from sprag_study.worker.models.registry import all_models
+from sprag_study.worker.models.transients import RESULTS as TRANSIENT_RESULTS
+from sprag_study.worker.models.vocabulary import caption, caption_texts
+from sprag_study.worker.states import StudyState
 
 #: Variables of motions by which a model finds the parts whose lines it draws.
 _SWINGING = ("pendulums.0.angle", "pendulums.1.angle", "shaft.angle")

@@ -6,8 +6,8 @@ It contains only physics, in SI units and radians, and imports only the standard
 from importlib import import_module
 from typing import Any
 
-from sprag.engine.endings import Ending
-from sprag.engine.run import Run, Span
+from sprag_study.engine.endings import Ending
+from sprag_study.engine.run import Run, Span
 
 #: Increased whenever a change of the engine can change a stored number.
 ENGINE_VERSION = "6"
@@ -17,5 +17,5 @@ __all__ = ["ENGINE_VERSION", "Ending", "Run", "Span"]
 
 def __getattr__(name: str) -> Any:
     if name == "simulate":  # with frames, which the engine itself does not know
-        return import_module("sprag").simulate
+        return import_module("sprag_study").simulate
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

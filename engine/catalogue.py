@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from sprag.sentences import Sentence
+from sprag_study.sentences import Sentence
 
 STANDARD_GRAVITY = 9.80665
 

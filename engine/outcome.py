@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.endings import Ending
+from sprag_study.engine.endings import Ending
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +17,7 @@ class Batch:
     values : float64 array, shape (cases, results)
         In the order of the model's catalogue of results; NaN where a value could not be computed.
     endings : int8 array, shape (cases,)
-        Index into `sprag.engine.endings.ENDINGS`.
+        Index into `sprag_study.engine.endings.ENDINGS`.
     """
 
     values: NDArray[np.float64]

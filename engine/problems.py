@@ -1,6 +1,6 @@
 """Faults of machines of any model. A base machine raises these; a case of a grid stores the ending instead."""
 
-from sprag.engine.endings import Ending
+from sprag_study.engine.endings import Ending
 
 
 class MachineError(ValueError):

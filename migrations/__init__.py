@@ -1,10 +1,10 @@
 """The way up for databases of earlier revisions, which `sprag db upgrade` goes.
 
-A new database is made from the description of the tables (`sprag.service.storage.tables`). An earlier one gets whatever
-tables, columns and indexes that description has and the database lacks; so a revision that only adds needs nothing here
-but its number. A revision that moves, fills or removes something has a step as well. Steps run after the additions, in
-the order of their revisions, and name tables by text: a step does the same on the day it is run as on the day it was
-written.
+A new database is made from the description of the tables (`sprag_study.service.storage.tables`). An earlier one gets
+whatever tables, columns and indexes that description has and the database lacks; so a revision that only adds needs
+nothing here but its number. A revision that moves, fills or removes something has a step as well. Steps run after the
+additions, in the order of their revisions, and name tables by text: a step does the same on the day it is run as on the
+day it was written.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from urllib.parse import SplitResult, unquote, urlsplit
 from pydantic import Field, SecretStr, ValidationInfo, field_validator
 from pydantic_settings import BaseSettings, NoDecode
 
-from sprag.service.languages import ENGLISH, available
+from sprag_study.service.languages import ENGLISH, available
 
 Security = Literal["tls", "starttls", "none"]
 _SCHEMES: Final[dict[str, tuple[Security, int]]] = {
@@ -48,7 +48,7 @@ class Delivery:
     origins : origins that webhooks may have, such as ``https://example.com:443``
     secret : key of their signatures
     language : of mails
-    units : of the pictures in them, as `sprag.service.reading.quantities.read_units` takes them
+    units : of the pictures in them, as `sprag_study.service.reading.quantities.read_units` takes them
     """
 
     public_url: str = "http://127.0.0.1:8000"
@@ -67,7 +67,7 @@ class Delivery:
 
 
 class DeliverySettings(BaseSettings):
-    """The settings of reports; a part of `sprag.service.settings.Settings`."""
+    """The settings of reports; a part of `sprag_study.service.settings.Settings`."""
 
     public_url: str = Field(
         default="",

@@ -4,10 +4,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
 
-from sprag.worker.errors import SpragError
+from sprag_study.worker.errors import SpragError
 
 #: Packages of the project itself, for which no extra helps.
-_OWN: Final = frozenset({"sprag"})
+_OWN: Final = frozenset({"sprag_study"})
 
 
 class MissingExtraError(SpragError, ImportError):
@@ -19,7 +19,7 @@ class MissingExtraError(SpragError, ImportError):
 def command_for(missing: ModuleNotFoundError, extra: str = "server") -> str | None:
     """The command that installs the missing package; None where no extra contains it."""
     package = (missing.name or "").partition(".")[0]
-    return None if not package or package in _OWN else f'pip install "sprag[{extra}]"'
+    return None if not package or package in _OWN else f'pip install "sprag-study[{extra}]"'
 
 
 @contextmanager

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
-    from sprag.service.faults import Code, Kind, WarningCode
+    from sprag_study.service.faults import Code, Kind, WarningCode
 
 #: Of faults of one place.
 MEANINGS: Final[dict[Code, str]] = {

@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypedDict, TypeVar
 
-from sprag.sentences import Sentence
-from sprag.worker.errors import SpragError
+from sprag_study.sentences import Sentence
+from sprag_study.worker.errors import SpragError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -240,7 +240,7 @@ class ParameterFault(Fault):
 
 
 class FaultError(SpragError):
-    """A failure that is reported to the caller; ``sprag.service.http.problems`` defines its form over HTTP.
+    """A failure that is reported to the caller; ``sprag_study.service.http.problems`` defines its form over HTTP.
 
     Attributes
     ----------

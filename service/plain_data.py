@@ -11,7 +11,7 @@ from decimal import Decimal
 from numbers import Integral, Rational, Real
 from typing import Any, Final
 
-from sprag.service.faults import Code, Fault
+from sprag_study.service.faults import Code, Fault
 
 #: Deeper data are refused, as those of a list that contains itself.
 _MOST_DEEP: Final = 100

@@ -24,8 +24,8 @@ from pydantic_settings import (
     SettingsConfigDict,
 )
 
-from sprag.service.delivery import Delivery, DeliverySettings
-from sprag.service.zones import zones
+from sprag_study.service.delivery import Delivery, DeliverySettings
+from sprag_study.service.zones import zones
 
 ENV_PREFIX = "SPRAG_"
 #: What precedes the password of an address, and the password: before the last "@", or among the options.
@@ -234,8 +234,8 @@ class Settings(DeliverySettings):
     @classmethod
     def _known_units(cls, value: str) -> str:
         if value not in {"workshop", "typed", "si"}:
-            from sprag.service.faults import SelectionError
-            from sprag.service.reading.quantities import read_units
+            from sprag_study.service.faults import SelectionError
+            from sprag_study.service.reading.quantities import read_units
 
             try:
                 read_units(value)

@@ -57,7 +57,7 @@ LONG = (
     # By their names these would be among the last.
     "worker/executors/test_dask_docs.py",
     "worker/executors/test_job_queue.py",
-    "sprag/test_library.py",
+    "sprag_study/test_library.py",
     "service/test_presets.py",
     "service/http/web/test_motion_pages.py",
     "service/http/web/test_prefix_page.py",
@@ -140,7 +140,7 @@ def _levels_of_before() -> Iterator[None]:
 @pytest.fixture
 def sprag(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Callable[..., Finished]:
     """Runs a command, such as ``sprag("fit", path, "--accuracy", "0.05")``, in this process."""
-    from sprag.service.cli.app import execute
+    from sprag_study.service.cli.app import execute
 
     monkeypatch.delenv("SPRAG_DEBUG", raising=False)
     monkeypatch.delenv("SPRAG_SERVER", raising=False)
@@ -165,7 +165,7 @@ def examples() -> Path:
 @pytest.fixture(scope="session")
 def empty_database(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """A database without studies, made once."""
-    from sprag.service.storage.store import Store
+    from sprag_study.service.storage.store import Store
     from tests import statements
 
     statements.share()
@@ -192,7 +192,7 @@ def postgres_server() -> Iterator[postgres.Server]:
 
 @pytest.fixture(scope="session")
 def _ready_database(postgres_server: postgres.Server) -> str:
-    from sprag.service.storage.store import Store
+    from sprag_study.service.storage.store import Store
     from tests import statements
 
     statements.share()

@@ -107,7 +107,7 @@ def empty(url: str) -> None:
     """Take every row out of a database and begin its numbers anew: far quicker than another database."""
     import sqlalchemy as sa
 
-    from sprag.service.storage.database.session import Session
+    from sprag_study.service.storage.database.session import Session
 
     session = Session(url)
     with session.write() as connection:

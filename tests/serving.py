@@ -10,7 +10,7 @@ from typing import Any
 
 import uvicorn
 
-from sprag.service.http.timeouts import TimeoutProtocol
+from sprag_study.service.http.timeouts import TimeoutProtocol
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from sprag.worker import models
+from sprag_study.worker import models
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
@@ -52,4 +52,4 @@ def test_the_contracts_keep_every_model_apart() -> None:
     apart = {module for contract in contracts if contract["type"] == "independence" for module in contract["modules"]}
     for name in models.model_names():
         package = type(models.model_of(name)).__module__.removesuffix(".model")
-        assert {f"sprag.engine.{name.replace('-', '_')}", package} <= apart
+        assert {f"sprag_study.engine.{name.replace('-', '_')}", package} <= apart

@@ -10,13 +10,13 @@ from pathlib import Path
 import pytest
 import typer
 
-from sprag.engine.machine_shaft.results import MACHINE_RESULTS
-from sprag.engine.vibration_drive.regimes import settled_infos
-from sprag.service.cli.app import app
-from sprag.service.presets import ABOUT, preset_names, preset_text
-from sprag.worker import models
-from sprag.worker.codes import ENDING_CODES, FLAG_MASKS
-from sprag.worker.states import StudyState
+from sprag_study.engine.machine_shaft.results import MACHINE_RESULTS
+from sprag_study.engine.vibration_drive.regimes import settled_infos
+from sprag_study.service.cli.app import app
+from sprag_study.service.presets import ABOUT, preset_names, preset_text
+from sprag_study.worker import models
+from sprag_study.worker.codes import ENDING_CODES, FLAG_MASKS
+from sprag_study.worker.states import StudyState
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]

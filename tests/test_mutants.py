@@ -13,9 +13,8 @@ from benchmarks.mutants import MUTANTS, ROOT, Mutant, chosen, copy_program
 
 def test_what_runs_in_the_copy_is_the_copy(tmp_path: Path) -> None:
     copy_program(tmp_path)
-    where = (
-        "from importlib.util import find_spec; print(*(find_spec(f'sprag.{n}').origin for n in ('engine', 'worker')))"
-    )
+    names = ("sprag_study.engine", "sprag_study.worker")
+    where = f"from importlib.util import find_spec; print(*(find_spec(name).origin for name in {names}))"
     environment = {"PYTHONPATH": str(tmp_path)}
     told = subprocess.run(
         [sys.executable, "-c", where], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True

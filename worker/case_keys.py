@@ -1,7 +1,7 @@
 """A number for each case, by which equal cases of other studies are found without looking at these studies.
 
 Equal cases (equal parameters, equal `kin_hash`) have equal keys. Unequal ones have unequal keys nearly always: whoever
-finds a key compares the cases themselves (`sprag.worker.reuse.shared_cases`).
+finds a key compares the cases themselves (`sprag_study.worker.reuse.shared_cases`).
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.worker.derived import blocks
-from sprag.worker.spread import DRIVE
+from sprag_study.worker.derived import blocks
+from sprag_study.worker.spread import DRIVE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.worker.axis import Axis
-    from sprag.worker.study import Study
+    from sprag_study.worker.axis import Axis
+    from sprag_study.worker.study import Study
 
     Keys = NDArray[np.int64]
     Words = NDArray[np.uint64]

@@ -6,14 +6,14 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from sprag.sentences import Amount, Sentence, WarningText
-from sprag.worker import models
-from sprag.worker.sweeps import line_length
+from sprag_study.sentences import Amount, Sentence, WarningText
+from sprag_study.worker import models
+from sprag_study.worker.sweeps import line_length
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
 #: Work of one chunk on one core, in s: a compromise between the cost of a crash and of a commit.
 CHUNK_SECONDS = 1.0

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.worker.models.formulas import needed, sources
-from sprag.worker.models.parameters import parameter_of
-from sprag.worker.spread import DRIVE
+from sprag_study.worker.models.formulas import needed, sources
+from sprag_study.worker.models.parameters import parameter_of
+from sprag_study.worker.spread import DRIVE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
     from numpy.typing import NDArray
 
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
 #: Cases that are evaluated at once.
 _AT_ONCE: Final = 1 << 16

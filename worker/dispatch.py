@@ -19,9 +19,9 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, assert_never
 
-from sprag.sentences import Sentence
-from sprag.worker.models import WorkerEnding
-from sprag.worker.ports import Chunk, Fate
+from sprag_study.sentences import Sentence
+from sprag_study.worker.models import WorkerEnding
+from sprag_study.worker.ports import Chunk, Fate
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

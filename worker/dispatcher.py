@@ -1,4 +1,4 @@
-"""The dispatcher: carries out what `sprag.worker.dispatch` decides, between the store and the executor."""
+"""The dispatcher: carries out what `sprag_study.worker.dispatch` decides, between the store and the executor."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, assert_never
 
-from sprag.sentences import Sentence
-from sprag.worker import dispatch
-from sprag.worker.dispatch import Dispatch
-from sprag.worker.opening import Opening
-from sprag.worker.ports import (
+from sprag_study.sentences import Sentence
+from sprag_study.worker import dispatch
+from sprag_study.worker.dispatch import Dispatch
+from sprag_study.worker.opening import Opening
+from sprag_study.worker.ports import (
     Chunk,
     EpochLostError,
     Fate,
@@ -21,18 +21,18 @@ from sprag.worker.ports import (
     StoreFullError,
     UnreadableStudyError,
 )
-from sprag.worker.reports import Reporter
-from sprag.worker.reuse import no_cases, taken
-from sprag.worker.rounds import PlanError, Rounds
-from sprag.worker.states import StudyState
+from sprag_study.worker.reports import Reporter
+from sprag_study.worker.reuse import no_cases, taken
+from sprag_study.worker.rounds import PlanError, Rounds
+from sprag_study.worker.states import StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from sprag.worker.ports import ActiveStudy, Clock, Executor, Known, News, Store
-    from sprag.worker.study import Study
+    from sprag_study.worker.ports import ActiveStudy, Clock, Executor, Known, News, Store
+    from sprag_study.worker.study import Study
 
-_LOG = logging.getLogger(__name__)
+_LOG = logging.getLogger("sprag.worker")
 
 #: Seconds between two polls of the store for new studies and requests; also the longest wait for the executor.
 POLL_SECONDS = 0.1

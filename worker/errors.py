@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from sprag.sentences import Sentence
+from sprag_study.sentences import Sentence
 
 
 class SpragError(Exception):

@@ -22,10 +22,11 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Final
 
-from sprag.worker import models
+from sprag_study.worker import models
 
 _SOURCES: Final = "sources of engine and worker"
-_PACKAGES: Final = ("sprag", "numpy", "numba", "llvmlite", "scipy")
+#: Name in the fingerprint: distribution.
+_PACKAGES: Final = {"sprag": "sprag-study"} | {name: name for name in ("numpy", "numba", "llvmlite", "scipy")}
 #: Settings of numba that do not change what its code computes; those of the processor change its speed only.
 _NUMBA_HARMLESS: Final = frozenset(
     {
@@ -61,7 +62,7 @@ def collect() -> dict[str, str]:
     changed = f", changed to {now} while process {os.getpid()} ran"
     return {
         _SOURCES: _AT_START if now == _AT_START else _AT_START + changed,
-        **{name: _version(name) for name in _PACKAGES},
+        **{name: _version(package) for name, package in _PACKAGES.items()},
         "Python": platform.python_version(),
         "C library": " ".join(platform.libc_ver()),
         "machine": platform.machine(),

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag.sentences import Sentence
-from sprag.worker import fingerprint
-from sprag.worker.sharing import gives, takes
+from sprag_study.sentences import Sentence
+from sprag_study.worker import fingerprint
+from sprag_study.worker.sharing import gives, takes
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from sprag.worker.ports import ActiveStudy, Clock, Executor, Peer, Store
-    from sprag.worker.study import Study
+    from sprag_study.worker.ports import ActiveStudy, Clock, Executor, Peer, Store
+    from sprag_study.worker.study import Study
 
 #: Number of studies active at the same time; the others wait in order of submission. Each owner may have one, however
 #: many others have.

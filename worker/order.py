@@ -15,7 +15,7 @@ Of a study with tolerances the passes of the nominal drive come first. Then come
 passes that double their number: every pass ends with complete ribbons of the first 1, 2, 4, 8, .. drives, and a number
 that is a power of two is what Sobol draws are balanced for.
 
-The cases of a swept study are run line by line instead (`sprag.worker.sweeps`), with or without a deadline.
+The cases of a swept study are run line by line instead (`sprag_study.worker.sweeps`), with or without a deadline.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from sprag.sentences import Sentence, plural
-from sprag.worker.sweeps import LineOrder
+from sprag_study.sentences import Sentence, plural
+from sprag_study.worker.sweeps import LineOrder
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
     Numbers = NDArray[np.int64]
 

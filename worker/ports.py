@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Protocol
 
-from sprag.worker.errors import SpragError
+from sprag_study.worker.errors import SpragError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -16,18 +16,18 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from sprag.worker.models import ChunkResult
-    from sprag.worker.planning.rounds import Rows
-    from sprag.worker.reports import ExecutorReport
-    from sprag.worker.states import StudyState
-    from sprag.worker.study import Study
+    from sprag_study.worker.models import ChunkResult
+    from sprag_study.worker.planning.rounds import Rows
+    from sprag_study.worker.reports import ExecutorReport
+    from sprag_study.worker.states import StudyState
+    from sprag_study.worker.study import Study
 
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
     """Consecutive cases of one study, the unit of claim and commit.
 
-    They are consecutive in the order in which the study runs: by number, or as `sprag.worker.order` says.
+    They are consecutive in the order in which the study runs: by number, or as `sprag_study.worker.order` says.
     ``study`` is the study's number in order of submission. ``failures`` counts how often these cases, as one chunk,
     crashed their process or timed out. ``unit`` is the number of cases that cannot be run apart: those of a line of a
     sweep, otherwise 1. A chunk has whole units.

@@ -14,18 +14,18 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.worker import models
-from sprag.worker.derived import distinct_values
-from sprag.worker.spread import DRIVE
-from sprag.worker.study import Axis
-from sprag.worker.sweeps import whole_lines
+from sprag_study.worker import models
+from sprag_study.worker.derived import distinct_values
+from sprag_study.worker.spread import DRIVE
+from sprag_study.worker.study import Axis
+from sprag_study.worker.sweeps import whole_lines
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
     Cases = NDArray[np.int64]
     Values = NDArray[np.float64]

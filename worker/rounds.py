@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 from cachetools import LRUCache
 
-from sprag.worker.derived import refused_value
-from sprag.worker.planning import planner_of
+from sprag_study.worker.derived import refused_value
+from sprag_study.worker.planning import planner_of
 
 if TYPE_CHECKING:
-    from sprag.worker.planning.rounds import Planner, Step
-    from sprag.worker.ports import Chunk, Store
-    from sprag.worker.study import Study
+    from sprag_study.worker.planning.rounds import Planner, Step
+    from sprag_study.worker.ports import Chunk, Store
+    from sprag_study.worker.study import Study
 
 #: Studies whose planners are kept, so that the rows of a round are read once.
 _KEPT = 16

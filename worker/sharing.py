@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from sprag.worker.ports import ActiveStudy, Peer
+    from sprag_study.worker.ports import ActiveStudy, Peer
 
 
 def takes(study: ActiveStudy, fingerprint: str, studies: int, peers: Sequence[Peer], *, stuck: bool = False) -> bool:

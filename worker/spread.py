@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker.packed import packed, unpacked
+from sprag_study.worker.packed import packed, unpacked
 
 if TYPE_CHECKING:
     Floats = NDArray[np.float64]

@@ -3,7 +3,7 @@
 from enum import StrEnum
 from typing import ClassVar
 
-from sprag.sentences import Sentence
+from sprag_study.sentences import Sentence
 
 
 class StudyState(StrEnum):

@@ -12,12 +12,12 @@ from typing import Any, Literal, cast, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker.axis import SAME_VALUE, Axis
-from sprag.worker.directions import DOWN, SWEEP, UP
-from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES, MAX_COLUMNS
-from sprag.worker.models.formulas import evaluate
-from sprag.worker.packed import packed, unpacked
-from sprag.worker.spread import DRIVE, Spread
+from sprag_study.worker.axis import SAME_VALUE, Axis
+from sprag_study.worker.directions import DOWN, SWEEP, UP
+from sprag_study.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES, MAX_COLUMNS
+from sprag_study.worker.models.formulas import evaluate
+from sprag_study.worker.packed import packed, unpacked
+from sprag_study.worker.spread import DRIVE, Spread
 
 __all__ = ["SAME_VALUE", "Axis", "Combine", "Study"]
 
@@ -44,11 +44,11 @@ class Study:
         The non-numeric part of the machine as plain JSON data, where the model has one (a machine shaft's mechanism,
         tables and formulas); immutable.
     plan : dict or None
-        How a study that chooses its own cases does so, as plain JSON data (`sprag.worker.planning`); immutable. Its
-        axes are zipped and have the cases of the rounds so far.
+        How a study that chooses its own cases does so, as plain JSON data (`sprag_study.worker.planning`); immutable.
+        Its axes are zipped and have the cases of the rounds so far.
     derive : dict
-        Path -> formula of other parameters in SI numbers (`sprag.worker.models.formulas`), sorted by path; immutable.
-        No axis varies such a path, and its value in `base` is that of the formula there.
+        Path -> formula of other parameters in SI numbers (`sprag_study.worker.models.formulas`), sorted by path;
+        immutable. No axis varies such a path, and its value in `base` is that of the formula there.
     combine : "grid" or "zip"
         Grid: every combination, the first axis varies slowest. Zip: the axes side by side, all of one length.
     spread : Spread or None
@@ -56,12 +56,13 @@ class Study:
         case belongs to, and the base and the other axes hold nominal values.
     sweep : str or None
         A path of the axis along which each case starts from the settled motion of its neighbour
-        (`sprag.worker.sweeps`). The axis with the path `SWEEP`, the last one, then gives the direction of each case.
+        (`sprag_study.worker.sweeps`). The axis with the path `SWEEP`, the last one, then gives the direction of each
+        case.
 
     Raises
     ------
     ValueError
-        When the parts are inconsistent (a repeated path, unequal lengths) or exceed `sprag.worker.limits`.
+        When the parts are inconsistent (a repeated path, unequal lengths) or exceed `sprag_study.worker.limits`.
     """
 
     model: str

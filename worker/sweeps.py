@@ -2,7 +2,7 @@
 
 The cases with equal values on all other axes and the same direction are a *line*. A line is run in the order of the
 swept values, ascending (up) or descending (down), and never split: every case needs the one before it. The direction
-is an axis with the path `sprag.worker.directions.SWEEP`, the last one of the study.
+is an axis with the path `sprag_study.worker.directions.SWEEP`, the last one of the study.
 """
 
 from __future__ import annotations
@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.worker.directions import DOWN
+from sprag_study.worker.directions import DOWN
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
     Numbers = NDArray[np.int64]
 
@@ -70,7 +70,7 @@ def line_to(study: Study, case: int) -> Numbers:
 class LineOrder:
     """The order of the cases of a swept grid: line after line, each in its own direction.
 
-    Lines are in the order of the case numbers of their first cases; there are no passes (`sprag.worker.order`).
+    Lines are in the order of the case numbers of their first cases; there are no passes (`sprag_study.worker.order`).
     """
 
     passes: tuple[int, ...] = ()

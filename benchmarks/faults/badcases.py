@@ -1,7 +1,7 @@
 """Cases that crash their process, and cases that never return, among many sound ones; then they are run again.
 
-The engine's own hook (`sprag.engine.faults`) makes them bad; it is off in the second service, where a retry makes them
-sound.
+The engine's own hook (`sprag_study.engine.faults`) makes them bad; it is off in the second service, where a retry makes
+them sound.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.faults import harness
-from sprag.worker import models
+from sprag_study.worker import models
 
 
 def cache(folder: Path, *, cases: int, size: int = 64) -> dict[str, Any]:
@@ -50,7 +50,7 @@ def own_cache(folder: Path, made: dict[str, Any]) -> Path:
 
 def _warm_up(made: dict[str, Any], cache: Path) -> None:
     """Compile the study's kernel into ``cache``. What was copied saves time, but belongs to other paths in part."""
-    program = "import json, sys; from benchmarks.faults import harness; from sprag.worker import models; "
+    program = "import json, sys; from benchmarks.faults import harness; from sprag_study.worker import models; "
     program += "models.warm_up(harness.study_of(json.loads(sys.argv[1])))"
     command = [sys.executable, "-c", program, json.dumps(made)]
     subprocess.run(command, env=harness.environment(SPRAG_KERNEL_CACHE=str(cache)), check=True)

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.faults import harness
-from sprag.service.jobs.preview import estimated_bytes
-from sprag.service.storage.store import Store
-from sprag.service.storage.work.room import RESERVE_BYTES
+from sprag_study.service.jobs.preview import estimated_bytes
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.work.room import RESERVE_BYTES
 
 _STATE = "SELECT state FROM studies WHERE id = ?"
 

@@ -23,14 +23,14 @@ import numpy as np
 
 from benchmarks.faults.fate import Fate, before_commits, before_writes
 from benchmarks.faults.harness import PATIENCE, ROOT, environment, spec, study_of
-from sprag.service.jobs.dispatching import WorkerSettings, run_dispatcher
-from sprag.service.storage.database.postgres import EPOCHS
-from sprag.service.storage.store import Store
-from sprag.worker import models
-from sprag.worker.chunking import Chunking
-from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.ports import EpochLostError, StoreError
-from sprag.worker.states import StudyState
+from sprag_study.service.jobs.dispatching import WorkerSettings, run_dispatcher
+from sprag_study.service.storage.database.postgres import EPOCHS
+from sprag_study.service.storage.store import Store
+from sprag_study.worker import models
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.executors.inline import InlineExecutor
+from sprag_study.worker.ports import EpochLostError, StoreError
+from sprag_study.worker.states import StudyState
 
 #: Chunks are small, so that there are many transactions.
 CHUNK = 4

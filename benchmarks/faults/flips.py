@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from sprag.service.storage.errors import StoreError
-from sprag.service.storage.store import Store
-from sprag.service.storage.studies.records import StudyRecord
-from sprag.worker import models
-from sprag.worker.chunking import Chunking
+from sprag_study.service.storage.errors import StoreError
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.studies.records import StudyRecord
+from sprag_study.worker import models
+from sprag_study.worker.chunking import Chunking
 from tests.worker import fakes
 
 #: Which results of the studies are counts or categories.

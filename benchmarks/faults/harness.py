@@ -20,15 +20,15 @@ import httpx
 import numpy as np
 import psutil
 
-from sprag.service.presets import preset_text
-from sprag.service.spec.document import load_spec, parse_spec
-from sprag.service.storage.database.sqlite_files import sqlite_driver
-from sprag.service.storage.store import Store
-from sprag.worker import models
-from sprag.worker.study import Study
+from sprag_study.service.presets import preset_text
+from sprag_study.service.spec.document import load_spec, parse_spec
+from sprag_study.service.storage.database.sqlite_files import sqlite_driver
+from sprag_study.service.storage.store import Store
+from sprag_study.worker import models
+from sprag_study.worker.study import Study
 
 ROOT = Path(__file__).resolve().parents[2]
-COMMAND = (sys.executable, "-m", "sprag.service.cli")
+COMMAND = (sys.executable, "-m", "sprag_study.service.cli")
 #: Generous: the machine may be busy.
 PATIENCE = 600.0
 _LOOK = 0.1

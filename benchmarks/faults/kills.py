@@ -17,7 +17,7 @@ import httpx
 import psutil
 
 from benchmarks.faults import harness
-from sprag.service.storage.database.sqlite_files import sqlite_driver
+from sprag_study.service.storage.database.sqlite_files import sqlite_driver
 
 #: What is killed, and how often in relation.
 TARGETS = {"pool process": 12, "dispatcher": 5, "service": 3}

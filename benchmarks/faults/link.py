@@ -10,8 +10,8 @@ from typing import Any
 from benchmarks.faults import harness
 from benchmarks.faults.cluster import clusters
 from benchmarks.faults.hosts import hosts
-from sprag.service.storage.store import Store
-from sprag.worker.chunking import Chunking
+from sprag_study.service.storage.store import Store
+from sprag_study.worker.chunking import Chunking
 
 #: Seconds after which a connection counts as lost: the fewest that Dask takes, instead of 30.
 LOST_SECONDS = 11

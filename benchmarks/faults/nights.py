@@ -23,14 +23,14 @@ from typing import Any
 
 from benchmarks.faults.fate import Fate, before_commits, before_writes
 from benchmarks.faults.harness import PATIENCE, ROOT, environment
-from sprag.service.delivery import Delivery
-from sprag.service.jobs.reports import reporter
-from sprag.service.jobs.scheduler import Scheduler
-from sprag.service.schedules.fields import read_fields
-from sprag.service.storage.schedules.reports import CLAIM, ReportState
-from sprag.service.storage.store import Store
-from sprag.worker.dispatcher import Dispatcher
-from sprag.worker.executors.inline import InlineExecutor
+from sprag_study.service.delivery import Delivery
+from sprag_study.service.jobs.reports import reporter
+from sprag_study.service.jobs.scheduler import Scheduler
+from sprag_study.service.schedules.fields import read_fields
+from sprag_study.service.storage.schedules.reports import CLAIM, ReportState
+from sprag_study.service.storage.store import Store
+from sprag_study.worker.dispatcher import Dispatcher
+from sprag_study.worker.executors.inline import InlineExecutor
 from tests.service.schedules.receivers import Hook, MailBox, mail_server, webhook
 from tests.service.timed_spec import SPEC
 from tests.worker import fakes

@@ -17,17 +17,17 @@ from typing import Any
 
 from benchmarks.faults.harness import environment
 from benchmarks.faults.syscalls import Call, Disk, record
-from sprag.service.storage.database.sqlite_files import sqlite_driver
-from sprag.service.storage.store import Store
+from sprag_study.service.storage.database.sqlite_files import sqlite_driver
+from sprag_study.service.storage.store import Store
 
 _PROGRAM = """
 import os
 import sys
 from pathlib import Path
-from sprag.service.storage.store import Store
+from sprag_study.service.storage.store import Store
 from tests.worker import fakes
-from sprag.worker.chunking import Chunking
-from sprag.worker.ports import Finished
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.ports import Finished
 
 def say(text):
     os.write(1, text.encode() + b"\\n")

@@ -21,17 +21,17 @@ import sqlalchemy as sa
 
 from benchmarks.faults.fate import Fate, before_commits, before_writes
 from benchmarks.faults.harness import ROOT, environment
-from sprag.service.presets import preset_text
-from sprag.service.spec.document import load_spec, parse_spec
-from sprag.service.storage.part import SystemClock
-from sprag.service.storage.store import Store
-from sprag.service.storage.tables import STUDIES, results_table
-from sprag.worker import planning
-from sprag.worker.chunking import Chunking
-from sprag.worker.dispatcher import Dispatcher
-from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.planning.rounds import Planner
-from sprag.worker.states import StudyState
+from sprag_study.service.presets import preset_text
+from sprag_study.service.spec.document import load_spec, parse_spec
+from sprag_study.service.storage.part import SystemClock
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.tables import STUDIES, results_table
+from sprag_study.worker import planning
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.dispatcher import Dispatcher
+from sprag_study.worker.executors.inline import InlineExecutor
+from sprag_study.worker.planning.rounds import Planner
+from sprag_study.worker.states import StudyState
 
 #: Events of the whole study, roughly: what is drawn lies within, or the process ends with the study.
 _EVENTS = 60

@@ -14,11 +14,11 @@ from typing import Any
 from benchmarks.faults import harness
 from benchmarks.faults.kills import kill
 from benchmarks.faults.rounds import create, spec, whole
-from sprag.service.storage.part import SystemClock
-from sprag.service.storage.store import Store
-from sprag.worker.chunking import Chunking
-from sprag.worker.dispatcher import Dispatcher
-from sprag.worker.executors.inline import InlineExecutor
+from sprag_study.service.storage.part import SystemClock
+from sprag_study.service.storage.store import Store
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.dispatcher import Dispatcher
+from sprag_study.worker.executors.inline import InlineExecutor
 
 
 def served_rounds(folder: Path, *, count: int, seed: int, processes: int = 2, chunk: int = 2) -> dict[str, Any]:

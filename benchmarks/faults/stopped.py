@@ -12,9 +12,9 @@ from typing import Any
 import psutil
 
 from benchmarks.faults import harness
-from sprag.service.storage.database.session import Session
-from sprag.service.storage.store import Store
-from sprag.worker.chunking import Chunking
+from sprag_study.service.storage.database.session import Session
+from sprag_study.service.storage.store import Store
+from sprag_study.worker.chunking import Chunking
 
 _LATEST = "SELECT max(epoch) FROM dispatchers"
 

@@ -15,9 +15,9 @@ from typing import Any
 
 from benchmarks.faults import harness
 from benchmarks.faults.kills import kill
-from sprag.service.presets import preset_text
-from sprag.service.storage.store import Store
-from sprag.worker import models
+from sprag_study.service.presets import preset_text
+from sprag_study.service.storage.store import Store
+from sprag_study.worker import models
 
 #: How many lines have lost their process and have not been run again.
 _LOST = "SELECT count(*) FROM chunks WHERE failures > 0 AND state <> 'done'"

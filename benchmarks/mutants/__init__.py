@@ -27,7 +27,7 @@ __all__ = ("MUTANTS", "ROOT", "Mutant", "chosen", "copy_program", "main")
 
 ROOT = Path(__file__).resolve().parents[2]
 MUTANTS = (*STORAGE, *MOTION)
-_FOLDERS = ("sprag", "engine", "worker", "service", "migrations", "tests", "benchmarks")
+_FOLDERS = ("sprag_study", "engine", "worker", "service", "migrations", "tests", "benchmarks")
 _PASSED, _FAILED, _ENDLESS = "passed", "failed", "came to no end"
 #: A test of a mutant is stopped after this many times the time of the program itself, or these seconds if that is less.
 _TIMES, _LEAST = 5.0, 180.0
@@ -42,7 +42,7 @@ def chosen(words: Sequence[str]) -> list[Mutant]:
 
 
 def copy_program(tree: Path) -> None:
-    """Copy the program and its tests; the links in ``sprag/`` stay links, so that the changed copy is imported."""
+    """Copy the program and its tests; the links in ``sprag_study/`` stay links: the changed copy is imported."""
     for name in _FOLDERS:
         shutil.copytree(ROOT / name, tree / name, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
     for name in ("pyproject.toml", "examples"):

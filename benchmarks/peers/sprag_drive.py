@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.workloads import COMPARED, EVENTS, Ints, Outcome, Workload
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.run import Run
-from sprag.engine.vibration_drive.results import result_infos
-from sprag.engine.vibration_drive.simulate import simulate
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.run import Run
+from sprag_study.engine.vibration_drive.results import result_infos
+from sprag_study.engine.vibration_drive.simulate import simulate
 
 
 class SpragDrive:

@@ -15,8 +15,8 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
-from sprag.engine.compile.ways import WAY
-from sprag.engine.sources import engine_folder, source_hash
+from sprag_study.engine.compile.ways import WAY
+from sprag_study.engine.sources import engine_folder, source_hash
 
 #: Environment variable that moves the cache.
 CACHE_VARIABLE = "SPRAG_KERNEL_CACHE"

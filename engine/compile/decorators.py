@@ -9,7 +9,7 @@ from numba.core.compiler import CompilerBase
 from numba.core.types import unliteral
 from numba.extending import intrinsic
 
-from sprag.engine.compile.program import PartCompiler, ProgramCompiler
+from sprag_study.engine.compile.program import PartCompiler, ProgramCompiler
 
 P = ParamSpec("P")
 R = TypeVar("R")

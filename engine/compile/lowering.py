@@ -19,8 +19,8 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
-from sprag.engine.compile.fused import fused
-from sprag.engine.compile.ways import GROUP
+from sprag_study.engine.compile.fused import fused
+from sprag_study.engine.compile.ways import GROUP
 
 _DOUBLE = ir.DoubleType()
 _INT = ir.IntType(64)

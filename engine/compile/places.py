@@ -15,8 +15,8 @@ from typing import Any
 import numba
 from numba.core.caching import UserProvidedCacheLocator
 
-from sprag.engine.compile.cache import cache_folder
-from sprag.engine.sources import engine_folder
+from sprag_study.engine.compile.cache import cache_folder
+from sprag_study.engine.sources import engine_folder
 
 _ENSURED: set[str] = set()
 

@@ -14,8 +14,8 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from sprag.engine.compile.fused import fused
-from sprag.engine.compile.ways import GROUP
+from sprag_study.engine.compile.fused import fused
+from sprag_study.engine.compile.ways import GROUP
 
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.engine.continuation.linear import Matrix, Vector, dot, eigenvalues, norm, solve
+from sprag_study.engine.continuation.linear import Matrix, Vector, dot, eigenvalues, norm, solve
 
 if TYPE_CHECKING:
-    from sprag.engine.continuation.problem import Pattern, ReturnMap
+    from sprag_study.engine.continuation.problem import Pattern, ReturnMap
 
 #: Scaled disturbance for central differences.
 DISTURBANCE = 1e-6

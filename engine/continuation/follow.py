@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.engine.continuation.corrector import DISTURBANCE, Corrector, Node
-from sprag.engine.continuation.linear import dot
-from sprag.engine.continuation.locate import Between
-from sprag.engine.continuation.problem import Branch, Contact, End, Kind, Point, Special, differences
+from sprag_study.engine.continuation.corrector import DISTURBANCE, Corrector, Node
+from sprag_study.engine.continuation.linear import dot
+from sprag_study.engine.continuation.locate import Between
+from sprag_study.engine.continuation.problem import Branch, Contact, End, Kind, Point, Special, differences
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.engine.continuation.problem import Floats, ReturnMap
+    from sprag_study.engine.continuation.problem import Floats, ReturnMap
 
 #: Cosine of the largest angle between the tangents of neighbouring points on a smooth part of a branch.
 _STRAIGHT = 0.95

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from sprag.engine.continuation.problem import Kind
+from sprag_study.engine.continuation.problem import Kind
 
 if TYPE_CHECKING:
-    from sprag.engine.continuation.corrector import Corrector, Node
+    from sprag_study.engine.continuation.corrector import Corrector, Node
 
 Test = Callable[["Node"], float]
 

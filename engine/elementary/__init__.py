@@ -4,7 +4,7 @@ numpy and the C library choose among versions of theirs by the processor, whose 
 (docs/adr/0031-processors-may-differ.md). Here are the functions of arrays; `angles` and `powers` are for compiled code.
 """
 
-from sprag.engine.elementary.arrays import (
+from sprag_study.engine.elementary.arrays import (
     arccos,
     arcsin,
     arctan,

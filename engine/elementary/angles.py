@@ -6,8 +6,8 @@ accurate to less than two ulps, sine, cosine and their inverses to less than thr
 
 import math
 
-from sprag.engine.compile.jit import inlined, part
-from sprag.engine.taylor.straight import COSINE, HALF_PI, ROUND, SINE
+from sprag_study.engine.compile.jit import inlined, part
+from sprag_study.engine.taylor.straight import COSINE, HALF_PI, ROUND, SINE
 
 _PI_1, _PI_2, _PI_3 = (float(text) for text in HALF_PI)
 _ROUND = float(ROUND)
@@ -54,19 +54,19 @@ def _of_quadrant(x: float, turned: float) -> float:
 
 @part
 def sine(x: float) -> float:
-    """Sine of ``x``, up to `sprag.engine.taylor.straight.LARGEST_ANGLE` in modulus."""
+    """Sine of ``x``, up to `sprag_study.engine.taylor.straight.LARGEST_ANGLE` in modulus."""
     return _of_quadrant(x, 0.0)
 
 
 @part
 def cosine(x: float) -> float:
-    """Cosine of ``x``, up to `sprag.engine.taylor.straight.LARGEST_ANGLE` in modulus."""
+    """Cosine of ``x``, up to `sprag_study.engine.taylor.straight.LARGEST_ANGLE` in modulus."""
     return _of_quadrant(x, 1.0)
 
 
 @part
 def tangent(x: float) -> float:
-    """Tangent of ``x``, up to `sprag.engine.taylor.straight.LARGEST_ANGLE` in modulus."""
+    """Tangent of ``x``, up to `sprag_study.engine.taylor.straight.LARGEST_ANGLE` in modulus."""
     return _of_quadrant(x, 0.0) / _of_quadrant(x, 1.0)
 
 

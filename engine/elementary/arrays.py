@@ -13,7 +13,7 @@ from typing import Final, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.elementary.functions import (
+from sprag_study.engine.elementary.functions import (
     ARCCOS,
     ARCSIN,
     ARCTAN,
@@ -28,7 +28,7 @@ from sprag.engine.elementary.functions import (
     TAN,
     TANH,
 )
-from sprag.engine.taylor.straight import LARGEST_ANGLE
+from sprag_study.engine.taylor.straight import LARGEST_ANGLE
 
 Floats = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ _DIGITS: Final = 1_200
 @cache
 def _loops() -> ModuleType:
     """The compiled loops: numba takes long to load, and many processes read formulas without computing any."""
-    from sprag.engine.elementary import loops
+    from sprag_study.engine.elementary import loops
 
     return loops
 

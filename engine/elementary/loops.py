@@ -3,18 +3,18 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.compile.jit import compiled
-from sprag.engine.elementary.angles import arccosine, arcsine, arctangent, arctangent_of, cosine, sine, tangent
-from sprag.engine.elementary.functions import ARCCOS, ARCSIN, ARCTAN, ARCTAN2, COS, COSH, EXP, LOG, SIN, SINH, TAN
-from sprag.engine.elementary.powers import (
+from sprag_study.engine.compile.jit import compiled
+from sprag_study.engine.elementary.angles import arccosine, arcsine, arctangent, arctangent_of, cosine, sine, tangent
+from sprag_study.engine.elementary.functions import ARCCOS, ARCSIN, ARCTAN, ARCTAN2, COS, COSH, EXP, LOG, SIN, SINH, TAN
+from sprag_study.engine.elementary.powers import (
     exponential,
     hyperbolic_cosine,
     hyperbolic_sine,
     hyperbolic_tangent,
     logarithm,
 )
-from sprag.engine.elementary.powers import power as power_of
-from sprag.engine.taylor.straight import LARGEST_ANGLE
+from sprag_study.engine.elementary.powers import power as power_of
+from sprag_study.engine.taylor.straight import LARGEST_ANGLE
 
 Floats = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ import math
 
 import numpy as np
 
-from sprag.engine.compile.jit import bits_of, inlined, of_bits, part
-from sprag.engine.taylor.straight import ROUND
+from sprag_study.engine.compile.jit import bits_of, inlined, of_bits, part
+from sprag_study.engine.taylor.straight import ROUND
 
 _LN2_HIGH, _LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
 _SQRT_TWO = 1.4142135623730951

@@ -21,9 +21,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine import elementary
-from sprag.engine.problems import MachineError
-from sprag.sentences import Sentence
+from sprag_study.engine import elementary
+from sprag_study.engine.problems import MachineError
+from sprag_study.sentences import Sentence
 
 Floats = NDArray[np.float64]
 Value = Floats | float

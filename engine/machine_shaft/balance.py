@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.machine_shaft.panels import Panels
-from sprag.engine.machine_shaft.spec import Balance, BalanceSide
+from sprag_study.engine.machine_shaft.panels import Panels
+from sprag_study.engine.machine_shaft.spec import Balance, BalanceSide
 
 Floats = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine import elementary
-from sprag.engine.machine_shaft.sliders import Slider
+from sprag_study.engine import elementary
+from sprag_study.engine.machine_shaft.sliders import Slider
 
 Floats = NDArray[np.float64]
 

@@ -7,10 +7,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine import elementary
-from sprag.engine.machine_shaft.mechanisms import Body, Mechanism, Motion, Values, number_of, reduced
-from sprag.engine.machine_shaft.problems import amount
-from sprag.sentences import Sentence
+from sprag_study.engine import elementary
+from sprag_study.engine.machine_shaft.mechanisms import Body, Mechanism, Motion, Values, number_of, reduced
+from sprag_study.engine.machine_shaft.problems import amount
+from sprag_study.sentences import Sentence
 
 Floats = NDArray[np.float64]
 CamLaw = Literal["cycloidal", "polynomial_345"]

@@ -5,10 +5,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.machine_shaft.columns import Columns
-from sprag.engine.machine_shaft.machine import Machine, check_structure
-from sprag.engine.machine_shaft.problems import (
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.machine_shaft.columns import Columns
+from sprag_study.engine.machine_shaft.machine import Machine, check_structure
+from sprag_study.engine.machine_shaft.problems import (
     AssemblyError,
     InsufficientInertiaError,
     MotorOverrunError,
@@ -18,11 +18,11 @@ from sprag.engine.machine_shaft.problems import (
     QuadratureError,
     UnbalancedWorkError,
 )
-from sprag.engine.machine_shaft.relations import check_relations
-from sprag.engine.machine_shaft.results import result_infos
-from sprag.engine.machine_shaft.simulate import simulate
-from sprag.engine.machine_shaft.spec import MachineSpec
-from sprag.engine.problems import MachineError
+from sprag_study.engine.machine_shaft.relations import check_relations
+from sprag_study.engine.machine_shaft.results import result_infos
+from sprag_study.engine.machine_shaft.simulate import simulate
+from sprag_study.engine.machine_shaft.spec import MachineSpec
+from sprag_study.engine.problems import MachineError
 
 _NAMES = tuple(info.name for info in result_infos())
 
@@ -41,7 +41,7 @@ def check(model: MachineSpec, columns: Mapping[str, ArrayLike]) -> Ending:
     Raises
     ------
     MachineError
-        One of ``sprag.engine.machine_shaft.problems``.
+        One of ``sprag_study.engine.machine_shaft.problems``.
     """
     check_structure(model)
     row = Columns.of(model, columns, 1)

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.machine_shaft.parameters import parameters
-from sprag.engine.machine_shaft.spec import MachineSpec
+from sprag_study.engine.machine_shaft.parameters import parameters
+from sprag_study.engine.machine_shaft.spec import MachineSpec
 
 Floats = NDArray[np.float64]
 

@@ -12,10 +12,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.machine_shaft.fluctuation import energy_coefficient, harmonics, shares
-from sprag.engine.machine_shaft.machine import Fields
-from sprag.engine.machine_shaft.panels import Crossings, Extremes, Panels, Points
-from sprag.engine.machine_shaft.start import Shape
+from sprag_study.engine.machine_shaft.fluctuation import energy_coefficient, harmonics, shares
+from sprag_study.engine.machine_shaft.machine import Fields
+from sprag_study.engine.machine_shaft.panels import Crossings, Extremes, Panels, Points
+from sprag_study.engine.machine_shaft.start import Shape
 
 Floats = NDArray[np.float64]
 

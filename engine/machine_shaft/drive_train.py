@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.machine_shaft.flywheel import Flywheel
-from sprag.engine.machine_shaft.panels import Panels
-from sprag.engine.machine_shaft.spec import MOVING, Drive
+from sprag_study.engine.machine_shaft.flywheel import Flywheel
+from sprag_study.engine.machine_shaft.panels import Panels
+from sprag_study.engine.machine_shaft.spec import MOVING, Drive
 
 Floats = NDArray[np.float64]
 

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from sprag.engine.compile.jit import compiled, part
-from sprag.engine.formulas.expressions import Expression, Node
-from sprag.engine.machine_shaft import intervals as iv
-from sprag.engine.machine_shaft.intervals import ORDERS
-from sprag.engine.machine_shaft.panels import POSITIONS, WEIGHTS, apply
+from sprag_study.engine.compile.jit import compiled, part
+from sprag_study.engine.formulas.expressions import Expression, Node
+from sprag_study.engine.machine_shaft import intervals as iv
+from sprag_study.engine.machine_shaft.intervals import ORDERS
+from sprag_study.engine.machine_shaft.panels import POSITIONS, WEIGHTS, apply
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -1,8 +1,8 @@
 """Estimated time of a case from the structure of its machine (measured by benchmarks/machine_shaft.py)."""
 
-from sprag.engine.formulas.expressions import TIME, Expression, Node, names_of
-from sprag.engine.machine_shaft.simulate import PANELS
-from sprag.engine.machine_shaft.spec import MachineSpec
+from sprag_study.engine.formulas.expressions import TIME, Expression, Node, names_of
+from sprag_study.engine.machine_shaft.simulate import PANELS
+from sprag_study.engine.machine_shaft.spec import MachineSpec
 
 #: Measured times of a case relative to that with the midrange as mean.
 _COST = {"midrange": 1.0, "angle": 2.2, "time": 1.7}

@@ -7,10 +7,10 @@ of Machines*, chapter 16).
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine import elementary
-from sprag.engine.compile.jit import compiled
-from sprag.engine.machine_shaft.panels import WEIGHTS, Panels
-from sprag.engine.machine_shaft.spec import HARMONICS
+from sprag_study.engine import elementary
+from sprag_study.engine.compile.jit import compiled
+from sprag_study.engine.machine_shaft.panels import WEIGHTS, Panels
+from sprag_study.engine.machine_shaft.spec import HARMONICS
 
 Floats = NDArray[np.float64]
 

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.machine_shaft.columns import Columns
-from sprag.engine.machine_shaft.results import result_infos
-from sprag.engine.machine_shaft.roots import bracketed_roots
-from sprag.engine.machine_shaft.spec import Flywheel as Shapes
-from sprag.engine.machine_shaft.spec import MachineSpec, MeanSpeed
-from sprag.engine.machine_shaft.start import Shape, Stop, least_mean_speed, mean_speed
+from sprag_study.engine.machine_shaft.columns import Columns
+from sprag_study.engine.machine_shaft.results import result_infos
+from sprag_study.engine.machine_shaft.roots import bracketed_roots
+from sprag_study.engine.machine_shaft.spec import Flywheel as Shapes
+from sprag_study.engine.machine_shaft.spec import MachineSpec, MeanSpeed
+from sprag_study.engine.machine_shaft.start import Shape, Stop, least_mean_speed, mean_speed
 
 Floats = NDArray[np.float64]
 

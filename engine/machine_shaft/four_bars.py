@@ -6,8 +6,8 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine import elementary
-from sprag.engine.machine_shaft.mechanisms import (
+from sprag_study.engine import elementary
+from sprag_study.engine.machine_shaft.mechanisms import (
     Body,
     HarmonicMechanism,
     Motion,
@@ -17,8 +17,8 @@ from sprag.engine.machine_shaft.mechanisms import (
     number_of,
     reduced,
 )
-from sprag.engine.machine_shaft.problems import amount
-from sprag.sentences import Sentence
+from sprag_study.engine.machine_shaft.problems import amount
+from sprag_study.sentences import Sentence
 
 Floats = NDArray[np.float64]
 

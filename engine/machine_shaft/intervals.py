@@ -13,9 +13,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.compile.jit import part
-from sprag.engine.elementary import angles, powers
-from sprag.engine.taylor.straight import LARGEST_ANGLE
+from sprag_study.engine.compile.jit import part
+from sprag_study.engine.elementary import angles, powers
+from sprag_study.engine.taylor.straight import LARGEST_ANGLE
 
 Floats = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 ORDERS = 12
 #: Distance of 1 to the next number, and the least number above 0.
 _ULP, _LEAST = 2.0**-52, 5e-324
-#: Assumed error of `sprag.engine.elementary` in units in the last place: more than its tests allow.
+#: Assumed error of `sprag_study.engine.elementary` in units in the last place: more than its tests allow.
 _LIBRARY = 5.0
 
 

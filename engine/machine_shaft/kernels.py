@@ -6,7 +6,7 @@ Arrays are C-contiguous float64. The results of a case never depend on other cas
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.compile.jit import compiled
+from sprag_study.engine.compile.jit import compiled
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.machine_shaft.decomposition import Decomposition
-from sprag.engine.machine_shaft.machine import Fields, Machine
-from sprag.engine.machine_shaft.motor import Characteristic, characteristic, motor_torque
-from sprag.engine.machine_shaft.motor_tables import MotorTable
-from sprag.engine.machine_shaft.panels import Panels
-from sprag.engine.machine_shaft.pieces import courses
-from sprag.engine.machine_shaft.roots import bracketed_roots, switches
-from sprag.engine.machine_shaft.speed_course import follows_speed
+from sprag_study.engine.machine_shaft.decomposition import Decomposition
+from sprag_study.engine.machine_shaft.machine import Fields, Machine
+from sprag_study.engine.machine_shaft.motor import Characteristic, characteristic, motor_torque
+from sprag_study.engine.machine_shaft.motor_tables import MotorTable
+from sprag_study.engine.machine_shaft.panels import Panels
+from sprag_study.engine.machine_shaft.pieces import courses
+from sprag_study.engine.machine_shaft.roots import bracketed_roots, switches
+from sprag_study.engine.machine_shaft.speed_course import follows_speed
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

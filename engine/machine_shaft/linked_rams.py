@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine import elementary
-from sprag.engine.machine_shaft.four_bars import (
+from sprag_study.engine import elementary
+from sprag_study.engine.machine_shaft.four_bars import (
     Links,
     crank_rocker_rule,
     listed_links,
@@ -14,10 +14,16 @@ from sprag.engine.machine_shaft.four_bars import (
     rocking,
     swinging,
 )
-from sprag.engine.machine_shaft.mechanisms import Motion, RodMechanism, Values, lifted, number_of, reduced
-from sprag.engine.machine_shaft.problems import amount
-from sprag.engine.machine_shaft.sliders import Slider, slider_bodies, slider_dead_centres, slider_fold, slider_margin
-from sprag.sentences import Sentence
+from sprag_study.engine.machine_shaft.mechanisms import Motion, RodMechanism, Values, lifted, number_of, reduced
+from sprag_study.engine.machine_shaft.problems import amount
+from sprag_study.engine.machine_shaft.sliders import (
+    Slider,
+    slider_bodies,
+    slider_dead_centres,
+    slider_fold,
+    slider_margin,
+)
+from sprag_study.sentences import Sentence
 
 Floats = NDArray[np.float64]
 

@@ -6,17 +6,17 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.formulas.expressions import RESERVED, Expression, ExpressionError
-from sprag.engine.machine_shaft.columns import Columns
-from sprag.engine.machine_shaft.drive_train import Train
-from sprag.engine.machine_shaft.mechanisms import RodMechanism
-from sprag.engine.machine_shaft.motor import characteristic, free_speed
-from sprag.engine.machine_shaft.operations import SpeedLaw, formula_breaks
-from sprag.engine.machine_shaft.parameters import parameters
-from sprag.engine.machine_shaft.parts import Jumps, ShaftPart, mechanism_of
-from sprag.engine.machine_shaft.pieces import Formula
-from sprag.engine.machine_shaft.problems import StructureError, amount
-from sprag.engine.machine_shaft.spec import (
+from sprag_study.engine.formulas.expressions import RESERVED, Expression, ExpressionError
+from sprag_study.engine.machine_shaft.columns import Columns
+from sprag_study.engine.machine_shaft.drive_train import Train
+from sprag_study.engine.machine_shaft.mechanisms import RodMechanism
+from sprag_study.engine.machine_shaft.motor import characteristic, free_speed
+from sprag_study.engine.machine_shaft.operations import SpeedLaw, formula_breaks
+from sprag_study.engine.machine_shaft.parameters import parameters
+from sprag_study.engine.machine_shaft.parts import Jumps, ShaftPart, mechanism_of
+from sprag_study.engine.machine_shaft.pieces import Formula
+from sprag_study.engine.machine_shaft.problems import StructureError, amount
+from sprag_study.engine.machine_shaft.spec import (
     LINKED,
     MAX_CONSTANTS,
     MAX_PARTS,
@@ -25,8 +25,8 @@ from sprag.engine.machine_shaft.spec import (
     MachineSpec,
     PartChoice,
 )
-from sprag.engine.machine_shaft.tables import periodic
-from sprag.sentences import Amount, Sentence
+from sprag_study.engine.machine_shaft.tables import periodic
+from sprag_study.sentences import Amount, Sentence
 
 Floats = NDArray[np.float64]
 

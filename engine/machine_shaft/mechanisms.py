@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine import elementary
-from sprag.sentences import Sentence
+from sprag_study.engine import elementary
+from sprag_study.sentences import Sentence
 
 Floats = NDArray[np.float64]
 #: Values of parameters by their name within the mechanism; each of shape (cases or 1, 1, 1).

@@ -7,11 +7,11 @@ from typing import Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.machine_shaft.motor_tables import MotorTable, motor_table
-from sprag.engine.machine_shaft.operations import SpeedLaw
-from sprag.engine.machine_shaft.panels import Panels
-from sprag.engine.machine_shaft.spec import Drive
-from sprag.engine.machine_shaft.stability import Stability
+from sprag_study.engine.machine_shaft.motor_tables import MotorTable, motor_table
+from sprag_study.engine.machine_shaft.operations import SpeedLaw
+from sprag_study.engine.machine_shaft.panels import Panels
+from sprag_study.engine.machine_shaft.spec import Drive
+from sprag_study.engine.machine_shaft.stability import Stability
 
 Floats = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.machine_shaft.problems import TableError, amount
-from sprag.engine.machine_shaft.tables import Curve, Table, over_speed
-from sprag.sentences import Sentence
+from sprag_study.engine.machine_shaft.problems import TableError, amount
+from sprag_study.engine.machine_shaft.tables import Curve, Table, over_speed
+from sprag_study.sentences import Sentence
 
 Floats = NDArray[np.float64]
 

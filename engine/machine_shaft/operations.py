@@ -5,13 +5,13 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine import elementary
-from sprag.engine.formulas.expressions import MEAN_SPEED, Expression
-from sprag.engine.machine_shaft.mechanisms import Values
-from sprag.engine.machine_shaft.roots import switches
-from sprag.engine.machine_shaft.spec import OperationChoice
-from sprag.engine.machine_shaft.strokes import Stroke
-from sprag.engine.machine_shaft.tables import Curve, along_strokes, over_stroke, periodic
+from sprag_study.engine import elementary
+from sprag_study.engine.formulas.expressions import MEAN_SPEED, Expression
+from sprag_study.engine.machine_shaft.mechanisms import Values
+from sprag_study.engine.machine_shaft.roots import switches
+from sprag_study.engine.machine_shaft.spec import OperationChoice
+from sprag_study.engine.machine_shaft.strokes import Stroke
+from sprag_study.engine.machine_shaft.tables import Curve, along_strokes, over_stroke, periodic
 
 Floats = NDArray[np.float64]
 #: Torque on the shaft in N*m at speeds of the shaft in rad/s, and its derivative by the speed.

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from itertools import chain
 
-from sprag.engine.catalogue import IN_MM, IN_RPM, STANDARD_GRAVITY, Parameter
-from sprag.engine.machine_shaft.spec import (
+from sprag_study.engine.catalogue import IN_MM, IN_RPM, STANDARD_GRAVITY, Parameter
+from sprag_study.engine.machine_shaft.spec import (
     MOVING,
     MachineSpec,
     MechanismChoice,

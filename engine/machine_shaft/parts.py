@@ -11,22 +11,22 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine import elementary
-from sprag.engine.formulas.expressions import MEAN_SPEED, Expression
-from sprag.engine.machine_shaft.bearings import JointForces, joint_forces
-from sprag.engine.machine_shaft.cams import Cam
-from sprag.engine.machine_shaft.columns import Columns
-from sprag.engine.machine_shaft.four_bars import FourBar, ParallelCrank
-from sprag.engine.machine_shaft.linkages import CrankShaper, ScotchYoke, SliderCrank, Whitworth
-from sprag.engine.machine_shaft.linked_rams import DragLink, Toggle
-from sprag.engine.machine_shaft.mechanisms import Mechanism, Motion, RodMechanism, Values
-from sprag.engine.machine_shaft.operations import Operation, SpeedLaw, every_revolution, formula_breaks
-from sprag.engine.machine_shaft.pieces import Formula
-from sprag.engine.machine_shaft.problems import TableError, amount
-from sprag.engine.machine_shaft.spec import MechanismChoice, MechanismKind, PartChoice
-from sprag.engine.machine_shaft.strokes import Stroke
-from sprag.engine.machine_shaft.tables import Curve, periodic
-from sprag.sentences import Sentence
+from sprag_study.engine import elementary
+from sprag_study.engine.formulas.expressions import MEAN_SPEED, Expression
+from sprag_study.engine.machine_shaft.bearings import JointForces, joint_forces
+from sprag_study.engine.machine_shaft.cams import Cam
+from sprag_study.engine.machine_shaft.columns import Columns
+from sprag_study.engine.machine_shaft.four_bars import FourBar, ParallelCrank
+from sprag_study.engine.machine_shaft.linkages import CrankShaper, ScotchYoke, SliderCrank, Whitworth
+from sprag_study.engine.machine_shaft.linked_rams import DragLink, Toggle
+from sprag_study.engine.machine_shaft.mechanisms import Mechanism, Motion, RodMechanism, Values
+from sprag_study.engine.machine_shaft.operations import Operation, SpeedLaw, every_revolution, formula_breaks
+from sprag_study.engine.machine_shaft.pieces import Formula
+from sprag_study.engine.machine_shaft.problems import TableError, amount
+from sprag_study.engine.machine_shaft.spec import MechanismChoice, MechanismKind, PartChoice
+from sprag_study.engine.machine_shaft.strokes import Stroke
+from sprag_study.engine.machine_shaft.tables import Curve, periodic
+from sprag_study.sentences import Sentence
 
 Floats = NDArray[np.float64]
 

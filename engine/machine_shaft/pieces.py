@@ -13,11 +13,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.formulas.expressions import Expression
-from sprag.engine.machine_shaft.enclosures import Program
-from sprag.engine.machine_shaft.panels import NODES, POSITIONS, WEIGHTS, Panels, Points
-from sprag.engine.machine_shaft.roots import switches
-from sprag.engine.machine_shaft.strokes import Stroke
+from sprag_study.engine.formulas.expressions import Expression
+from sprag_study.engine.machine_shaft.enclosures import Program
+from sprag_study.engine.machine_shaft.panels import NODES, POSITIONS, WEIGHTS, Panels, Points
+from sprag_study.engine.machine_shaft.roots import switches
+from sprag_study.engine.machine_shaft.strokes import Stroke
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -2,9 +2,9 @@
 
 import math
 
-from sprag.engine.endings import Ending
-from sprag.engine.problems import MachineError
-from sprag.sentences import Amount, Part, Sentence, joined
+from sprag_study.engine.endings import Ending
+from sprag_study.engine.problems import MachineError
+from sprag_study.sentences import Amount, Part, Sentence, joined
 
 
 def amount(value: float, unit: str = "1") -> Amount:

@@ -1,10 +1,10 @@
 """Checks of numbers that are individually in range but contradict each other; done before a base machine is solved."""
 
-from sprag.engine.machine_shaft.columns import Columns
-from sprag.engine.machine_shaft.operations import reachable_pressure
-from sprag.engine.machine_shaft.problems import RelationError, alone, amount
-from sprag.engine.machine_shaft.spec import MachineSpec
-from sprag.sentences import Sentence
+from sprag_study.engine.machine_shaft.columns import Columns
+from sprag_study.engine.machine_shaft.operations import reachable_pressure
+from sprag_study.engine.machine_shaft.problems import RelationError, alone, amount
+from sprag_study.engine.machine_shaft.spec import MachineSpec
+from sprag_study.sentences import Sentence
 
 
 def check_relations(spec: MachineSpec, row: Columns) -> None:

@@ -3,14 +3,14 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.machine_shaft.balance import largest_work
-from sprag.engine.machine_shaft.columns import Columns
-from sprag.engine.machine_shaft.decomposition import Decomposition
-from sprag.engine.machine_shaft.machine import Machine
-from sprag.engine.machine_shaft.panels import GIVEN, Panels
-from sprag.engine.machine_shaft.parts import ShaftPart
-from sprag.engine.machine_shaft.pieces import Part, Pieces, courses, missed
-from sprag.engine.machine_shaft.spec import MachineSpec
+from sprag_study.engine.machine_shaft.balance import largest_work
+from sprag_study.engine.machine_shaft.columns import Columns
+from sprag_study.engine.machine_shaft.decomposition import Decomposition
+from sprag_study.engine.machine_shaft.machine import Machine
+from sprag_study.engine.machine_shaft.panels import GIVEN, Panels
+from sprag_study.engine.machine_shaft.parts import ShaftPart
+from sprag_study.engine.machine_shaft.pieces import Part, Pieces, courses, missed
+from sprag_study.engine.machine_shaft.spec import MachineSpec
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -1,7 +1,7 @@
 """The results of a machine shaft: names, units, meaning (docs/theory-machine-shaft.md)."""
 
-from sprag.engine.catalogue import ResultInfo
-from sprag.engine.machine_shaft.spec import HARMONICS
+from sprag_study.engine.catalogue import ResultInfo
+from sprag_study.engine.machine_shaft.spec import HARMONICS
 
 
 def _squares() -> tuple[ResultInfo, ...]:

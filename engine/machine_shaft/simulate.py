@@ -7,24 +7,24 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.machine_shaft import resolution
-from sprag.engine.machine_shaft.balance import balanced
-from sprag.engine.machine_shaft.columns import Columns
-from sprag.engine.machine_shaft.decomposition import Decomposition, characteristics
-from sprag.engine.machine_shaft.drive_train import Train
-from sprag.engine.machine_shaft.flywheel import flywheel_results, required_inertia
-from sprag.engine.machine_shaft.kinks import motion_kinks
-from sprag.engine.machine_shaft.machine import Fields, Machine, check_structure
-from sprag.engine.machine_shaft.motor import characteristic, limit_cycle
-from sprag.engine.machine_shaft.panels import Panels
-from sprag.engine.machine_shaft.pieces import Pieces, pieces
-from sprag.engine.machine_shaft.results import result_infos
-from sprag.engine.machine_shaft.spec import MachineSpec
-from sprag.engine.machine_shaft.speed_course import follows_speed, speed_course
-from sprag.engine.machine_shaft.stability import Stability
-from sprag.engine.machine_shaft.start import Shape, Stop, least_mean_speed, start_energy
-from sprag.engine.outcome import Batch
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.machine_shaft import resolution
+from sprag_study.engine.machine_shaft.balance import balanced
+from sprag_study.engine.machine_shaft.columns import Columns
+from sprag_study.engine.machine_shaft.decomposition import Decomposition, characteristics
+from sprag_study.engine.machine_shaft.drive_train import Train
+from sprag_study.engine.machine_shaft.flywheel import flywheel_results, required_inertia
+from sprag_study.engine.machine_shaft.kinks import motion_kinks
+from sprag_study.engine.machine_shaft.machine import Fields, Machine, check_structure
+from sprag_study.engine.machine_shaft.motor import characteristic, limit_cycle
+from sprag_study.engine.machine_shaft.panels import Panels
+from sprag_study.engine.machine_shaft.pieces import Pieces, pieces
+from sprag_study.engine.machine_shaft.results import result_infos
+from sprag_study.engine.machine_shaft.spec import MachineSpec
+from sprag_study.engine.machine_shaft.speed_course import follows_speed, speed_course
+from sprag_study.engine.machine_shaft.stability import Stability
+from sprag_study.engine.machine_shaft.start import Shape, Stop, least_mean_speed, start_energy
+from sprag_study.engine.outcome import Batch
 
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int8]

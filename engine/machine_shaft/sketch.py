@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine import elementary
+from sprag_study.engine import elementary
 
 Floats = NDArray[np.float64]
 

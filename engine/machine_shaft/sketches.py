@@ -8,15 +8,15 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine import elementary
-from sprag.engine.machine_shaft.columns import Columns
-from sprag.engine.machine_shaft.four_bars import Links
-from sprag.engine.machine_shaft.machine import Machine
-from sprag.engine.machine_shaft.mechanisms import Mechanism
-from sprag.engine.machine_shaft.parts import ShaftPart
-from sprag.engine.machine_shaft.sketch import Bar, Plate, Sketch
-from sprag.engine.machine_shaft.sliders import Slider
-from sprag.engine.machine_shaft.spec import MachineSpec
+from sprag_study.engine import elementary
+from sprag_study.engine.machine_shaft.columns import Columns
+from sprag_study.engine.machine_shaft.four_bars import Links
+from sprag_study.engine.machine_shaft.machine import Machine
+from sprag_study.engine.machine_shaft.mechanisms import Mechanism
+from sprag_study.engine.machine_shaft.parts import ShaftPart
+from sprag_study.engine.machine_shaft.sketch import Bar, Plate, Sketch
+from sprag_study.engine.machine_shaft.sliders import Slider
+from sprag_study.engine.machine_shaft.spec import MachineSpec
 
 Floats = NDArray[np.float64]
 

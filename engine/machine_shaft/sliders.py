@@ -5,9 +5,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine import elementary
-from sprag.engine.machine_shaft.mechanisms import Body, Values, number_of
-from sprag.sentences import Sentence
+from sprag_study.engine import elementary
+from sprag_study.engine.machine_shaft.mechanisms import Body, Values, number_of
+from sprag_study.sentences import Sentence
 
 Floats = NDArray[np.float64]
 

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, get_args
 
-from sprag.engine.machine_shaft.cams import CamLaw
-from sprag.engine.machine_shaft.tables import Interpolation, Table
+from sprag_study.engine.machine_shaft.cams import CamLaw
+from sprag_study.engine.machine_shaft.tables import Interpolation, Table
 
 MeanSpeed = Literal["midrange", "angle", "time"]
 Balance = Literal["scale", "constant", "refuse", "motor"]

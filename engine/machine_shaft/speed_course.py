@@ -10,13 +10,13 @@ from dataclasses import fields as fields_of
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine import elementary
-from sprag.engine.machine_shaft.columns import Columns
-from sprag.engine.machine_shaft.machine import Fields, Machine
-from sprag.engine.machine_shaft.operations import SpeedLaw
-from sprag.engine.machine_shaft.panels import Panels
-from sprag.engine.machine_shaft.spec import MachineSpec
-from sprag.engine.machine_shaft.start import Shape, Stop, least_mean_speed, start_energy
+from sprag_study.engine import elementary
+from sprag_study.engine.machine_shaft.columns import Columns
+from sprag_study.engine.machine_shaft.machine import Fields, Machine
+from sprag_study.engine.machine_shaft.operations import SpeedLaw
+from sprag_study.engine.machine_shaft.panels import Panels
+from sprag_study.engine.machine_shaft.spec import MachineSpec
+from sprag_study.engine.machine_shaft.start import Shape, Stop, least_mean_speed, start_energy
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine import elementary
-from sprag.engine.machine_shaft.panels import Extremes, Panels, Points
-from sprag.engine.machine_shaft.quadrature import gauss
-from sprag.engine.machine_shaft.spec import MeanSpeed
+from sprag_study.engine import elementary
+from sprag_study.engine.machine_shaft.panels import Extremes, Panels, Points
+from sprag_study.engine.machine_shaft.quadrature import gauss
+from sprag_study.engine.machine_shaft.spec import MeanSpeed
 
 Floats = NDArray[np.float64]
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.machine_shaft.mechanisms import Mechanism, Values
-from sprag.engine.machine_shaft.roots import bracketed_roots
+from sprag_study.engine.machine_shaft.mechanisms import Mechanism, Values
+from sprag_study.engine.machine_shaft.roots import bracketed_roots
 
 Floats = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.machine_shaft.problems import TableError, amount
-from sprag.sentences import Sentence, plural
+from sprag_study.engine.machine_shaft.problems import TableError, amount
+from sprag_study.sentences import Sentence, plural
 
 if TYPE_CHECKING:
     # Imported on use, so that reading catalogues does not wait for it.

@@ -5,14 +5,14 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.machine_shaft.columns import Columns
-from sprag.engine.machine_shaft.decomposition import Decomposition
-from sprag.engine.machine_shaft.machine import Machine, check_structure
-from sprag.engine.machine_shaft.panels import Points
-from sprag.engine.machine_shaft.simulate import Solved, attempts, settle
-from sprag.engine.machine_shaft.spec import LINKED, MachineSpec
-from sprag.engine.outcome import Trajectory
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.machine_shaft.columns import Columns
+from sprag_study.engine.machine_shaft.decomposition import Decomposition
+from sprag_study.engine.machine_shaft.machine import Machine, check_structure
+from sprag_study.engine.machine_shaft.panels import Points
+from sprag_study.engine.machine_shaft.simulate import Solved, attempts, settle
+from sprag_study.engine.machine_shaft.spec import LINKED, MachineSpec
+from sprag_study.engine.outcome import Trajectory
 
 Floats = NDArray[np.float64]
 

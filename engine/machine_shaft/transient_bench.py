@@ -7,17 +7,17 @@ import numpy as np
 from numpy.polynomial import chebyshev, legendre
 from numpy.typing import NDArray
 
-from sprag.engine import elementary
-from sprag.engine.machine_shaft.balance import balanced
-from sprag.engine.machine_shaft.columns import Columns
-from sprag.engine.machine_shaft.machine import Fields, Machine
-from sprag.engine.machine_shaft.motor import characteristic, limit_cycle
-from sprag.engine.machine_shaft.operations import SpeedLaw
-from sprag.engine.machine_shaft.panels import COEFFICIENTS, NODES, Panels, apply
-from sprag.engine.machine_shaft.quadrature import product
-from sprag.engine.machine_shaft.spec import MachineSpec
-from sprag.engine.machine_shaft.speed_course import follows_speed
-from sprag.engine.machine_shaft.start import Shape, mean_speed
+from sprag_study.engine import elementary
+from sprag_study.engine.machine_shaft.balance import balanced
+from sprag_study.engine.machine_shaft.columns import Columns
+from sprag_study.engine.machine_shaft.machine import Fields, Machine
+from sprag_study.engine.machine_shaft.motor import characteristic, limit_cycle
+from sprag_study.engine.machine_shaft.operations import SpeedLaw
+from sprag_study.engine.machine_shaft.panels import COEFFICIENTS, NODES, Panels, apply
+from sprag_study.engine.machine_shaft.quadrature import product
+from sprag_study.engine.machine_shaft.spec import MachineSpec
+from sprag_study.engine.machine_shaft.speed_course import follows_speed
+from sprag_study.engine.machine_shaft.start import Shape, mean_speed
 
 Floats = NDArray[np.float64]
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from sprag.engine.outcome import Trajectory
+from sprag_study.engine.outcome import Trajectory
 
 Kind = Literal["run-up", "load-step", "coasting"]
 #: How a transient can end; "no_motion" where there is none to begin with.

@@ -15,8 +15,8 @@ Arrays are C-contiguous float64. Positions in a panel are -1 .. 1.
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.compile.jit import compiled, part
-from sprag.engine.machine_shaft.kernels import series_value
+from sprag_study.engine.compile.jit import compiled, part
+from sprag_study.engine.machine_shaft.kernels import series_value
 
 Floats = NDArray[np.float64]
 

@@ -5,18 +5,18 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.machine_shaft import transient_kernel as kernel
-from sprag.engine.machine_shaft.columns import Columns
-from sprag.engine.machine_shaft.machine import Machine, check_structure
-from sprag.engine.machine_shaft.panels import Panels
-from sprag.engine.machine_shaft.simulate import Solved, attempts, settle
-from sprag.engine.machine_shaft.spec import MachineSpec
-from sprag.engine.machine_shaft.transient_bench import Bench, Cycle
-from sprag.engine.machine_shaft.transient_causes import ROUGH_LOAD, cause_of
-from sprag.engine.machine_shaft.transient_course import COLUMNS, RESULTS, Course, Transient
-from sprag.engine.machine_shaft.transient_run import OUTCOMES, Run
-from sprag.engine.outcome import Trajectory
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.machine_shaft import transient_kernel as kernel
+from sprag_study.engine.machine_shaft.columns import Columns
+from sprag_study.engine.machine_shaft.machine import Machine, check_structure
+from sprag_study.engine.machine_shaft.panels import Panels
+from sprag_study.engine.machine_shaft.simulate import Solved, attempts, settle
+from sprag_study.engine.machine_shaft.spec import MachineSpec
+from sprag_study.engine.machine_shaft.transient_bench import Bench, Cycle
+from sprag_study.engine.machine_shaft.transient_causes import ROUGH_LOAD, cause_of
+from sprag_study.engine.machine_shaft.transient_course import COLUMNS, RESULTS, Course, Transient
+from sprag_study.engine.machine_shaft.transient_run import OUTCOMES, Run
+from sprag_study.engine.outcome import Trajectory
 
 Floats = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ find every root.
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.compile.jit import inlined
-from sprag.engine.taylor.straight import LaneCode, larger, smaller
+from sprag_study.engine.compile.jit import inlined
+from sprag_study.engine.taylor.straight import LaneCode, larger, smaller
 
 #: Polynomials in a block.
 SLOTS = 8

@@ -12,7 +12,7 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.compile.jit import part
+from sprag_study.engine.compile.jit import part
 
 Floats = NDArray[np.float64]
 

@@ -1,7 +1,7 @@
 """State and sums of every lane at the end of the part x of its step, from the stored series."""
 
-from sprag.engine.taylor.straight import LaneCode, Term, horner, integral, product, square
-from sprag.engine.vibration_drive.layout import Layout
+from sprag_study.engine.taylor.straight import LaneCode, Term, horner, integral, product, square
+from sprag_study.engine.vibration_drive.layout import Layout
 
 #: Smallest step, in excitation periods: below it a step no longer moves the phase.
 STEP_FLOOR = 1e-13

@@ -4,8 +4,18 @@ They are computed in the vector loop from the stored series; only lanes whose bo
 extremum get a second look (``lanes.look_for_events``, ``window.collect_peaks``).
 """
 
-from sprag.engine.taylor.straight import LaneCode, Span, Term, horner, larger, primitive_span, rate_span, smaller, span
-from sprag.engine.vibration_drive.layout import Layout
+from sprag_study.engine.taylor.straight import (
+    LaneCode,
+    Span,
+    Term,
+    horner,
+    larger,
+    primitive_span,
+    rate_span,
+    smaller,
+    span,
+)
+from sprag_study.engine.vibration_drive.layout import Layout
 
 #: Margin that indicates that the step itself is too long, not that a guard is close.
 TOO_LONG = -1e308

@@ -8,20 +8,20 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.continuation.follow import Range, follow
-from sprag.engine.continuation.problem import End, Point, Special
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.run import SettledRun
-from sprag.engine.vibration_drive.cases import Column, case_matrix, scalars, with_lengths
-from sprag.engine.vibration_drive.characteristics import characteristics
-from sprag.engine.vibration_drive.integration import integrate
-from sprag.engine.vibration_drive.kernel import Kernel, kernel_of
-from sprag.engine.vibration_drive.orbits import find_units
-from sprag.engine.vibration_drive.regimes import Regime
-from sprag.engine.vibration_drive.results import OF_RUNS, result_infos
-from sprag.engine.vibration_drive.return_map import DriveMap, Machines
-from sprag.engine.vibration_drive.settle import settle
-from sprag.engine.vibration_drive.strobes import BEGIN
+from sprag_study.engine.continuation.follow import Range, follow
+from sprag_study.engine.continuation.problem import End, Point, Special
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.run import SettledRun
+from sprag_study.engine.vibration_drive.cases import Column, case_matrix, scalars, with_lengths
+from sprag_study.engine.vibration_drive.characteristics import characteristics
+from sprag_study.engine.vibration_drive.integration import integrate
+from sprag_study.engine.vibration_drive.kernel import Kernel, kernel_of
+from sprag_study.engine.vibration_drive.orbits import find_units
+from sprag_study.engine.vibration_drive.regimes import Regime
+from sprag_study.engine.vibration_drive.results import OF_RUNS, result_infos
+from sprag_study.engine.vibration_drive.return_map import DriveMap, Machines
+from sprag_study.engine.vibration_drive.settle import settle
+from sprag_study.engine.vibration_drive.strobes import BEGIN
 
 Floats = NDArray[np.float64]
 

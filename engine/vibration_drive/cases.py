@@ -7,8 +7,8 @@ from enum import IntEnum, auto
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.run import Run
-from sprag.engine.vibration_drive.parameters import MAX_COEFFICIENTS, MAX_PENDULUMS, PARAMETERS
+from sprag_study.engine.run import Run
+from sprag_study.engine.vibration_drive.parameters import MAX_COEFFICIENTS, MAX_PENDULUMS, PARAMETERS
 
 Floats = NDArray[np.float64]
 

@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.vibration_drive.cases import Column, PendulumColumn, pendulum_column, stop_column
-from sprag.engine.vibration_drive.layout import OUT_EVENTS, OUT_RUNUP, OUT_STEPS, OUT_SUMS, Layout
-from sprag.engine.vibration_drive.regimes import keeps_windup
-from sprag.engine.vibration_drive.results import result_infos
+from sprag_study.engine.vibration_drive.cases import Column, PendulumColumn, pendulum_column, stop_column
+from sprag_study.engine.vibration_drive.layout import OUT_EVENTS, OUT_RUNUP, OUT_STEPS, OUT_SUMS, Layout
+from sprag_study.engine.vibration_drive.regimes import keeps_windup
+from sprag_study.engine.vibration_drive.results import result_infos
 
 Floats = NDArray[np.float64]
 

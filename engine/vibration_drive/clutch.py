@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.vibration_drive.clutch_data import HIGHEST_DEGREE, Rows, check_options, measured_rows
-from sprag.engine.vibration_drive.clutch_law import check_law, find_dip, stiffness, stored_energy, torque
-from sprag.engine.vibration_drive.clutch_report import (
+from sprag_study.engine.vibration_drive.clutch_data import HIGHEST_DEGREE, Rows, check_options, measured_rows
+from sprag_study.engine.vibration_drive.clutch_law import check_law, find_dip, stiffness, stored_energy, torque
+from sprag_study.engine.vibration_drive.clutch_report import (
     ClutchError,
     ClutchFit,
     ClutchFitError,
@@ -20,8 +20,8 @@ from sprag.engine.vibration_drive.clutch_report import (
     ClutchLawError,
     DegreeReport,
 )
-from sprag.engine.vibration_drive.singular_values import singular_values
-from sprag.sentences import Amount, Part, Sentence, WarningText, joined
+from sprag_study.engine.vibration_drive.singular_values import singular_values
+from sprag_study.sentences import Amount, Part, Sentence, WarningText, joined
 
 __all__ = [
     "HIGHEST_DEGREE",

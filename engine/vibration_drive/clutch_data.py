@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.vibration_drive.clutch_law import MAX_ANGLE, is_number, span, torque
-from sprag.engine.vibration_drive.clutch_report import ClutchFitError
-from sprag.engine.vibration_drive.parameters import MAX_COEFFICIENTS
-from sprag.sentences import Amount, Part, Sentence, plural
+from sprag_study.engine.vibration_drive.clutch_law import MAX_ANGLE, is_number, span, torque
+from sprag_study.engine.vibration_drive.clutch_report import ClutchFitError
+from sprag_study.engine.vibration_drive.parameters import MAX_COEFFICIENTS
+from sprag_study.sentences import Amount, Part, Sentence, plural
 
 HIGHEST_DEGREE = MAX_COEFFICIENTS - 1
 MAX_TORQUE = 1e9  # N*m

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.polynomial import polynomial as poly
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine import elementary
-from sprag.engine.taylor.straight import horner, integral, slope
-from sprag.engine.vibration_drive.clutch_report import ClutchLaw, ClutchLawError
-from sprag.engine.vibration_drive.formulas import beyond
-from sprag.engine.vibration_drive.parameters import CLUTCH_COEFFICIENT, MAX_COEFFICIENTS
-from sprag.sentences import Amount, Sentence, WarningText, joined, plural
+from sprag_study.engine import elementary
+from sprag_study.engine.taylor.straight import horner, integral, slope
+from sprag_study.engine.vibration_drive.clutch_report import ClutchLaw, ClutchLawError
+from sprag_study.engine.vibration_drive.formulas import beyond
+from sprag_study.engine.vibration_drive.parameters import CLUTCH_COEFFICIENT, MAX_COEFFICIENTS
+from sprag_study.sentences import Amount, Sentence, WarningText, joined, plural
 
 #: A value counts as negative when it is below zero by more than this share of the sum of its terms' magnitudes;
 #: less than that is rounding of a law that touches zero.

@@ -3,7 +3,7 @@
 import reprlib
 from dataclasses import dataclass
 
-from sprag.sentences import Sentence, WarningText, joined
+from sprag_study.sentences import Sentence, WarningText, joined
 
 
 class ClutchError(ValueError):

@@ -8,8 +8,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.compile.jit import compiled
-from sprag.engine.vibration_drive.orbits import list_free, same_states, tie
+from sprag_study.engine.compile.jit import compiled
+from sprag_study.engine.vibration_drive.orbits import list_free, same_states, tie
 
 Floats = NDArray[np.float64]
 

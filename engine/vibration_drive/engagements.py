@@ -10,18 +10,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.outcome import Engagement, Engagements, PeriodMeans
-from sprag.engine.run import Run, SettledRun
-from sprag.engine.vibration_drive.automaton import Clutch
-from sprag.engine.vibration_drive.cases import Column, case_matrix, with_lengths
-from sprag.engine.vibration_drive.integration import integrate
-from sprag.engine.vibration_drive.kernel import Kernel, kernel_of
-from sprag.engine.vibration_drive.layout import OUT_ENDING
-from sprag.engine.vibration_drive.pieces import Pieces, integrals, largest, products
-from sprag.engine.vibration_drive.regimes import Regime
-from sprag.engine.vibration_drive.settle import settle
-from sprag.engine.vibration_drive.strobes import BEGIN
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.outcome import Engagement, Engagements, PeriodMeans
+from sprag_study.engine.run import Run, SettledRun
+from sprag_study.engine.vibration_drive.automaton import Clutch
+from sprag_study.engine.vibration_drive.cases import Column, case_matrix, with_lengths
+from sprag_study.engine.vibration_drive.integration import integrate
+from sprag_study.engine.vibration_drive.kernel import Kernel, kernel_of
+from sprag_study.engine.vibration_drive.layout import OUT_ENDING
+from sprag_study.engine.vibration_drive.pieces import Pieces, integrals, largest, products
+from sprag_study.engine.vibration_drive.regimes import Regime
+from sprag_study.engine.vibration_drive.settle import settle
+from sprag_study.engine.vibration_drive.strobes import BEGIN
 
 Floats = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ data; the shaft's mobility is zero where it is held. A locked clutch has w' = sh
 
 import math
 
-from sprag.engine.taylor.straight import (
+from sprag_study.engine.taylor.straight import (
     LaneCode,
     Term,
     exp2,
@@ -24,8 +24,8 @@ from sprag.engine.taylor.straight import (
     smaller,
     square,
 )
-from sprag.engine.vibration_drive.formulas import base_series, drive, free_acceleration
-from sprag.engine.vibration_drive.layout import Layout
+from sprag_study.engine.vibration_drive.formulas import base_series, drive, free_acceleration
+from sprag_study.engine.vibration_drive.layout import Layout
 
 #: Share of the estimated convergence-limited step that is taken (Jorba and Zou 2005 take e^-2, which is far too careful
 #: here). With 0.75 there would be a tenth fewer steps, but three to five times the errors (benchmarks.engine).

@@ -3,13 +3,13 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.compile.jit import inlined, part
-from sprag.engine.taylor.batch import HARD, NONE, RESULT, SLOTS, STATUS, put, slot_start, take
-from sprag.engine.taylor.roots import RECIPROCAL, first_root
-from sprag.engine.vibration_drive.automaton import CLUTCH_TARGET, Band
-from sprag.engine.vibration_drive.layout import Layout
-from sprag.engine.vibration_drive.locking import ROUNDING, acceleration, decide, grazes, typical_speed
-from sprag.engine.vibration_drive.states import (
+from sprag_study.engine.compile.jit import inlined, part
+from sprag_study.engine.taylor.batch import HARD, NONE, RESULT, SLOTS, STATUS, put, slot_start, take
+from sprag_study.engine.taylor.roots import RECIPROCAL, first_root
+from sprag_study.engine.vibration_drive.automaton import CLUTCH_TARGET, Band
+from sprag_study.engine.vibration_drive.layout import Layout
+from sprag_study.engine.vibration_drive.locking import ROUNDING, acceleration, decide, grazes, typical_speed
+from sprag_study.engine.vibration_drive.states import (
     BEYOND,
     ENGAGED,
     EVENT_PENDULUM,

@@ -7,7 +7,7 @@ arrays.
 from collections.abc import Sequence
 from typing import TypeVar
 
-from sprag.engine.taylor.straight import Term
+from sprag_study.engine.taylor.straight import Term
 
 _Value = TypeVar("_Value", float, Term)
 _Pair = tuple[_Value, _Value]

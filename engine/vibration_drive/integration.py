@@ -6,17 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.run import Run
-from sprag.engine.taylor.batch import aligned_zeros, blocks_for
-from sprag.engine.taylor.roots import MAX_DEGREE, work_stack
-from sprag.engine.taylor.straight import same_everywhere
-from sprag.engine.vibration_drive.cases import STOPS, stop_column
-from sprag.engine.vibration_drive.characteristics import sum_columns
-from sprag.engine.vibration_drive.kernel import Kernel
-from sprag.engine.vibration_drive.layout import pendulum_samples
-from sprag.engine.vibration_drive.pieces import piece_width
-from sprag.engine.vibration_drive.states import LANE_INTEGERS
-from sprag.engine.vibration_drive.strobes import from_rest, width
+from sprag_study.engine.run import Run
+from sprag_study.engine.taylor.batch import aligned_zeros, blocks_for
+from sprag_study.engine.taylor.roots import MAX_DEGREE, work_stack
+from sprag_study.engine.taylor.straight import same_everywhere
+from sprag_study.engine.vibration_drive.cases import STOPS, stop_column
+from sprag_study.engine.vibration_drive.characteristics import sum_columns
+from sprag_study.engine.vibration_drive.kernel import Kernel
+from sprag_study.engine.vibration_drive.layout import pendulum_samples
+from sprag_study.engine.vibration_drive.pieces import piece_width
+from sprag_study.engine.vibration_drive.states import LANE_INTEGERS
+from sprag_study.engine.vibration_drive.strobes import from_rest, width
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

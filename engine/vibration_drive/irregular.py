@@ -5,16 +5,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.vibration_drive import orbits
-from sprag.engine.vibration_drive.cases import with_lengths
-from sprag.engine.vibration_drive.characteristics import characteristics, combined
-from sprag.engine.vibration_drive.integration import integrate
-from sprag.engine.vibration_drive.layout import OUT_STEPS
-from sprag.engine.vibration_drive.newton import disturbed
-from sprag.engine.vibration_drive.regimes import Regime, means
-from sprag.engine.vibration_drive.results import result_infos
-from sprag.engine.vibration_drive.search import ROUND, Search
-from sprag.engine.vibration_drive.strobes import BEGIN
+from sprag_study.engine.vibration_drive import orbits
+from sprag_study.engine.vibration_drive.cases import with_lengths
+from sprag_study.engine.vibration_drive.characteristics import characteristics, combined
+from sprag_study.engine.vibration_drive.integration import integrate
+from sprag_study.engine.vibration_drive.layout import OUT_STEPS
+from sprag_study.engine.vibration_drive.newton import disturbed
+from sprag_study.engine.vibration_drive.regimes import Regime, means
+from sprag_study.engine.vibration_drive.results import result_infos
+from sprag_study.engine.vibration_drive.search import ROUND, Search
+from sprag_study.engine.vibration_drive.strobes import BEGIN
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

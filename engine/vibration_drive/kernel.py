@@ -18,15 +18,15 @@ import llvmlite.binding as llvm
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.compile.cache import cache_folder
-from sprag.engine.compile.ways import GROUP
-from sprag.engine.taylor.batch import ROWS, SLOTS, peaks_loop, roots_loop
-from sprag.engine.taylor.straight import same_everywhere
-from sprag.engine.vibration_drive.advance import advance_loop
-from sprag.engine.vibration_drive.bounds import bounds_loop
-from sprag.engine.vibration_drive.cases import coefficient_count, pendulum_count
-from sprag.engine.vibration_drive.equations import series_loop
-from sprag.engine.vibration_drive.layout import Layout, make_layout
+from sprag_study.engine.compile.cache import cache_folder
+from sprag_study.engine.compile.ways import GROUP
+from sprag_study.engine.taylor.batch import ROWS, SLOTS, peaks_loop, roots_loop
+from sprag_study.engine.taylor.straight import same_everywhere
+from sprag_study.engine.vibration_drive.advance import advance_loop
+from sprag_study.engine.vibration_drive.bounds import bounds_loop
+from sprag_study.engine.vibration_drive.cases import coefficient_count, pendulum_count
+from sprag_study.engine.vibration_drive.equations import series_loop
+from sprag_study.engine.vibration_drive.layout import Layout, make_layout
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -35,15 +35,23 @@ _MODULE = '''"""Generated kernel: {n} pendulum(s), {coefficients} clutch coeffic
 
 import numpy as np
 
-from sprag.engine.compile.jit import compiled, constant_record, constant_shape, lane_loops, lane_mask, lowest, unmanaged
-from sprag.engine.vibration_drive.events import settle_guards
-from sprag.engine.vibration_drive.lanes import highest, load_case, look_for_events, pack, record, settle
-from sprag.engine.vibration_drive.layout import Layout, as_record
-from sprag.engine.vibration_drive.pieces import keep
-from sprag.engine.vibration_drive.states import LANE_INTEGERS
-from sprag.engine.vibration_drive.stops import next_stop
-from sprag.engine.vibration_drive.strobes import FRACTION
-from sprag.engine.vibration_drive.window import collect_peaks, settle_peaks
+from sprag_study.engine.compile.jit import (
+    compiled,
+    constant_record,
+    constant_shape,
+    lane_loops,
+    lane_mask,
+    lowest,
+    unmanaged,
+)
+from sprag_study.engine.vibration_drive.events import settle_guards
+from sprag_study.engine.vibration_drive.lanes import highest, load_case, look_for_events, pack, record, settle
+from sprag_study.engine.vibration_drive.layout import Layout, as_record
+from sprag_study.engine.vibration_drive.pieces import keep
+from sprag_study.engine.vibration_drive.states import LANE_INTEGERS
+from sprag_study.engine.vibration_drive.stops import next_stop
+from sprag_study.engine.vibration_drive.strobes import FRACTION
+from sprag_study.engine.vibration_drive.window import collect_peaks, settle_peaks
 
 LAYOUT = {layout!r}
 RECORD = as_record(LAYOUT)

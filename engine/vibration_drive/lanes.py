@@ -5,22 +5,22 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.compile.jit import part
-from sprag.engine.compile.ways import GROUP
-from sprag.engine.elementary.angles import cosine, sine
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.taylor.roots import evaluate
-from sprag.engine.vibration_drive import states as ev
-from sprag.engine.vibration_drive.advance import ANGLE_BOUND, SPEED_BOUND, STEP_FLOOR
-from sprag.engine.vibration_drive.automaton import Clutch, Shaft
-from sprag.engine.vibration_drive.bounds import TOO_LONG
-from sprag.engine.vibration_drive.cases import PENDULUM_COLUMNS, STOPS, Column, PendulumColumn, stop_column
-from sprag.engine.vibration_drive.events import collect_guards, transit
-from sprag.engine.vibration_drive.layout import OUT_ENDING, OUT_EVENTS, OUT_RUNUP, OUT_STEPS, OUT_SUMS, Layout
-from sprag.engine.vibration_drive.states import count_event, law, set_clutch, set_shaft, watch_fall
-from sprag.engine.vibration_drive.stops import next_stop
-from sprag.engine.vibration_drive.strobes import FRACTION, begin_at, note
-from sprag.engine.vibration_drive.window import primitive, sample, series, watch_extrema
+from sprag_study.engine.compile.jit import part
+from sprag_study.engine.compile.ways import GROUP
+from sprag_study.engine.elementary.angles import cosine, sine
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.taylor.roots import evaluate
+from sprag_study.engine.vibration_drive import states as ev
+from sprag_study.engine.vibration_drive.advance import ANGLE_BOUND, SPEED_BOUND, STEP_FLOOR
+from sprag_study.engine.vibration_drive.automaton import Clutch, Shaft
+from sprag_study.engine.vibration_drive.bounds import TOO_LONG
+from sprag_study.engine.vibration_drive.cases import PENDULUM_COLUMNS, STOPS, Column, PendulumColumn, stop_column
+from sprag_study.engine.vibration_drive.events import collect_guards, transit
+from sprag_study.engine.vibration_drive.layout import OUT_ENDING, OUT_EVENTS, OUT_RUNUP, OUT_STEPS, OUT_SUMS, Layout
+from sprag_study.engine.vibration_drive.states import count_event, law, set_clutch, set_shaft, watch_fall
+from sprag_study.engine.vibration_drive.stops import next_stop
+from sprag_study.engine.vibration_drive.strobes import FRACTION, begin_at, note
+from sprag_study.engine.vibration_drive.window import primitive, sample, series, watch_extrema
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -10,12 +10,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.compile.jit import inlined, part
-from sprag.engine.elementary.angles import cosine, sine
-from sprag.engine.vibration_drive.automaton import Band
-from sprag.engine.vibration_drive.formulas import base_series, drive, free_acceleration
-from sprag.engine.vibration_drive.layout import Layout
-from sprag.engine.vibration_drive.states import (
+from sprag_study.engine.compile.jit import inlined, part
+from sprag_study.engine.elementary.angles import cosine, sine
+from sprag_study.engine.vibration_drive.automaton import Band
+from sprag_study.engine.vibration_drive.formulas import base_series, drive, free_acceleration
+from sprag_study.engine.vibration_drive.layout import Layout
+from sprag_study.engine.vibration_drive.states import (
     ENGAGED,
     FREE,
     LOCKED,

@@ -15,11 +15,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.vibration_drive.cases import Column, PendulumColumn, pendulum_column, with_lengths
-from sprag.engine.vibration_drive.integration import integrate
-from sprag.engine.vibration_drive.layout import Layout, PendulumSample, pendulum_samples
-from sprag.engine.vibration_drive.search import Search
-from sprag.engine.vibration_drive.strobes import BEGIN
+from sprag_study.engine.vibration_drive.cases import Column, PendulumColumn, pendulum_column, with_lengths
+from sprag_study.engine.vibration_drive.integration import integrate
+from sprag_study.engine.vibration_drive.layout import Layout, PendulumSample, pendulum_samples
+from sprag_study.engine.vibration_drive.search import Search
+from sprag_study.engine.vibration_drive.strobes import BEGIN
 
 Floats = NDArray[np.float64]
 

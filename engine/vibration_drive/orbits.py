@@ -9,10 +9,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.compile.jit import compiled, part
-from sprag.engine.elementary.powers import exponential, logarithm
-from sprag.engine.vibration_drive.automaton import Clutch, Shaft
-from sprag.engine.vibration_drive.strobes import (
+from sprag_study.engine.compile.jit import compiled, part
+from sprag_study.engine.elementary.powers import exponential, logarithm
+from sprag_study.engine.vibration_drive.automaton import Clutch, Shaft
+from sprag_study.engine.vibration_drive.strobes import (
     ANGLE,
     CLUTCH,
     FALLS,

@@ -4,9 +4,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
-from sprag.engine.catalogue import IN_ANOTHER_UNIT, IN_DEGREES, IN_MM, IN_RPM, STANDARD_GRAVITY, Parameter
-from sprag.engine.vibration_drive.automaton import Clutch
-from sprag.sentences import Sentence
+from sprag_study.engine.catalogue import IN_ANOTHER_UNIT, IN_DEGREES, IN_MM, IN_RPM, STANDARD_GRAVITY, Parameter
+from sprag_study.engine.vibration_drive.automaton import Clutch
+from sprag_study.sentences import Sentence
 
 MAX_PENDULUMS = 8
 MAX_COEFFICIENTS = 12

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.compile.jit import part
-from sprag.engine.vibration_drive import states as ev
-from sprag.engine.vibration_drive.layout import Layout
+from sprag_study.engine.compile.jit import part
+from sprag_study.engine.vibration_drive import states as ev
+from sprag_study.engine.vibration_drive.layout import Layout
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -5,18 +5,18 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.outcome import Portrait, Trajectory
-from sprag.engine.run import Run, SettledRun
-from sprag.engine.vibration_drive.automaton import Clutch
-from sprag.engine.vibration_drive.cases import case_matrix, pendulum_count, scalars, with_lengths
-from sprag.engine.vibration_drive.integration import integrate
-from sprag.engine.vibration_drive.kernel import kernel_of
-from sprag.engine.vibration_drive.layout import OUT_ENDING
-from sprag.engine.vibration_drive.regimes import Regime, settled_infos
-from sprag.engine.vibration_drive.settle import settle
-from sprag.engine.vibration_drive.simulate import CLUTCH_NAMES, SHAFT_NAMES
-from sprag.engine.vibration_drive.strobes import (
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.outcome import Portrait, Trajectory
+from sprag_study.engine.run import Run, SettledRun
+from sprag_study.engine.vibration_drive.automaton import Clutch
+from sprag_study.engine.vibration_drive.cases import case_matrix, pendulum_count, scalars, with_lengths
+from sprag_study.engine.vibration_drive.integration import integrate
+from sprag_study.engine.vibration_drive.kernel import kernel_of
+from sprag_study.engine.vibration_drive.layout import OUT_ENDING
+from sprag_study.engine.vibration_drive.regimes import Regime, settled_infos
+from sprag_study.engine.vibration_drive.settle import settle
+from sprag_study.engine.vibration_drive.simulate import CLUTCH_NAMES, SHAFT_NAMES
+from sprag_study.engine.vibration_drive.strobes import (
     ANGLE,
     CLUTCH,
     PENDULUM_WIDTH,
@@ -27,7 +27,7 @@ from sprag.engine.vibration_drive.strobes import (
     WINDUP,
     in_order,
 )
-from sprag.engine.vibration_drive.turn import nothing, turn
+from sprag_study.engine.vibration_drive.turn import nothing, turn
 
 Floats = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.vibration_drive.automaton import Clutch
+from sprag_study.engine.vibration_drive.automaton import Clutch
 
 Floats = NDArray[np.float64]
 

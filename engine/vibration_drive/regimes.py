@@ -6,8 +6,8 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.catalogue import ResultInfo
-from sprag.engine.vibration_drive.results import result_infos
+from sprag_study.engine.catalogue import ResultInfo
+from sprag_study.engine.vibration_drive.results import result_infos
 
 Floats = NDArray[np.float64]
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 
-from sprag.engine.catalogue import Kind, ResultInfo
+from sprag_study.engine.catalogue import Kind, ResultInfo
 
 
 def _shaft() -> tuple[ResultInfo, ...]:

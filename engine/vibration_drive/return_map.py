@@ -1,4 +1,4 @@
-"""The iterated strobe map of a drive as a return map of one parameter (`sprag.engine.continuation`)."""
+"""The iterated strobe map of a drive as a return map of one parameter (`sprag_study.engine.continuation`)."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.continuation.problem import Pattern
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.run import Run
-from sprag.engine.vibration_drive.automaton import Clutch
-from sprag.engine.vibration_drive.cases import case_matrix, with_lengths
-from sprag.engine.vibration_drive.coordinates import to_points, to_strobes
-from sprag.engine.vibration_drive.engagements import read_steps
-from sprag.engine.vibration_drive.integration import integrate
-from sprag.engine.vibration_drive.kernel import Kernel
-from sprag.engine.vibration_drive.layout import OUT_ENDING
-from sprag.engine.vibration_drive.pieces import Pieces
-from sprag.engine.vibration_drive.simulate import CLUTCH_NAMES
-from sprag.engine.vibration_drive.strobes import BEGIN, FRACTION, TURN
+from sprag_study.engine.continuation.problem import Pattern
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.run import Run
+from sprag_study.engine.vibration_drive.automaton import Clutch
+from sprag_study.engine.vibration_drive.cases import case_matrix, with_lengths
+from sprag_study.engine.vibration_drive.coordinates import to_points, to_strobes
+from sprag_study.engine.vibration_drive.engagements import read_steps
+from sprag_study.engine.vibration_drive.integration import integrate
+from sprag_study.engine.vibration_drive.kernel import Kernel
+from sprag_study.engine.vibration_drive.layout import OUT_ENDING
+from sprag_study.engine.vibration_drive.pieces import Pieces
+from sprag_study.engine.vibration_drive.simulate import CLUTCH_NAMES
+from sprag_study.engine.vibration_drive.strobes import BEGIN, FRACTION, TURN
 
 Floats = NDArray[np.float64]
 #: The parameters of cases (as for ``simulate``) for values of the branch's parameter, shape (cases,).

@@ -5,15 +5,15 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.run import SettledRun
-from sprag.engine.vibration_drive.cases import Column, PendulumColumn, pendulum_column, with_lengths
-from sprag.engine.vibration_drive.integration import integrate
-from sprag.engine.vibration_drive.kernel import Kernel
-from sprag.engine.vibration_drive.regimes import Regime, means, settled_infos
-from sprag.engine.vibration_drive.results import result_infos
-from sprag.engine.vibration_drive.settle import SettledBatch
-from sprag.engine.vibration_drive.strobes import (
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.run import SettledRun
+from sprag_study.engine.vibration_drive.cases import Column, PendulumColumn, pendulum_column, with_lengths
+from sprag_study.engine.vibration_drive.integration import integrate
+from sprag_study.engine.vibration_drive.kernel import Kernel
+from sprag_study.engine.vibration_drive.regimes import Regime, means, settled_infos
+from sprag_study.engine.vibration_drive.results import result_infos
+from sprag_study.engine.vibration_drive.settle import SettledBatch
+from sprag_study.engine.vibration_drive.strobes import (
     ANGLE,
     BEGIN,
     FRACTION,

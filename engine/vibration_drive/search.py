@@ -9,16 +9,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.run import Run, SettledRun
-from sprag.engine.vibration_drive import newton, orbits
-from sprag.engine.vibration_drive.automaton import Clutch, Shaft
-from sprag.engine.vibration_drive.cases import Column, with_lengths
-from sprag.engine.vibration_drive.characteristics import characteristics, tied_clutches
-from sprag.engine.vibration_drive.integration import Integration, integrate
-from sprag.engine.vibration_drive.kernel import Kernel
-from sprag.engine.vibration_drive.layout import OUT_ENDING, OUT_EVENTS, OUT_STEPS
-from sprag.engine.vibration_drive.strobes import (
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.run import Run, SettledRun
+from sprag_study.engine.vibration_drive import newton, orbits
+from sprag_study.engine.vibration_drive.automaton import Clutch, Shaft
+from sprag_study.engine.vibration_drive.cases import Column, with_lengths
+from sprag_study.engine.vibration_drive.characteristics import characteristics, tied_clutches
+from sprag_study.engine.vibration_drive.integration import Integration, integrate
+from sprag_study.engine.vibration_drive.kernel import Kernel
+from sprag_study.engine.vibration_drive.layout import OUT_ENDING, OUT_EVENTS, OUT_STEPS
+from sprag_study.engine.vibration_drive.strobes import (
     BEGIN,
     CLUTCH,
     FRACTION,

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.run import SettledRun
-from sprag.engine.vibration_drive.cases import case_matrix, with_lengths
-from sprag.engine.vibration_drive.integration import integrate
-from sprag.engine.vibration_drive.kernel import kernel_of
-from sprag.engine.vibration_drive.layout import OUT_ENDING
-from sprag.engine.vibration_drive.settle import settle
-from sprag.engine.vibration_drive.strobes import BEGIN, FRACTION, in_order
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.run import SettledRun
+from sprag_study.engine.vibration_drive.cases import case_matrix, with_lengths
+from sprag_study.engine.vibration_drive.integration import integrate
+from sprag_study.engine.vibration_drive.kernel import kernel_of
+from sprag_study.engine.vibration_drive.layout import OUT_ENDING
+from sprag_study.engine.vibration_drive.settle import settle
+from sprag_study.engine.vibration_drive.strobes import BEGIN, FRACTION, in_order
 
 Floats = NDArray[np.float64]
 

@@ -7,18 +7,26 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.run import MEANS_FROM_PERIODS, SettledRun
-from sprag.engine.vibration_drive.cases import Column, case_matrix, pendulum_count
-from sprag.engine.vibration_drive.irregular import BATCHES, Batches
-from sprag.engine.vibration_drive.kernel import Kernel, kernel_of
-from sprag.engine.vibration_drive.lanes import RUNUP_SHARE
-from sprag.engine.vibration_drive.no_load import limit_of
-from sprag.engine.vibration_drive.orbits import distances, settling_periods
-from sprag.engine.vibration_drive.regimes import Regime, means, settled_infos
-from sprag.engine.vibration_drive.results import STEADY_SHAFT, result_infos
-from sprag.engine.vibration_drive.search import ROUND, RUNS, Orbits, Search, joined, transient_rounds
-from sprag.engine.vibration_drive.strobes import ANGLE, FRACTION, PENDULUM_WIDTH, SHAFT_SPEED, SHAFT_WIDTH, SPEED, width
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.run import MEANS_FROM_PERIODS, SettledRun
+from sprag_study.engine.vibration_drive.cases import Column, case_matrix, pendulum_count
+from sprag_study.engine.vibration_drive.irregular import BATCHES, Batches
+from sprag_study.engine.vibration_drive.kernel import Kernel, kernel_of
+from sprag_study.engine.vibration_drive.lanes import RUNUP_SHARE
+from sprag_study.engine.vibration_drive.no_load import limit_of
+from sprag_study.engine.vibration_drive.orbits import distances, settling_periods
+from sprag_study.engine.vibration_drive.regimes import Regime, means, settled_infos
+from sprag_study.engine.vibration_drive.results import STEADY_SHAFT, result_infos
+from sprag_study.engine.vibration_drive.search import ROUND, RUNS, Orbits, Search, joined, transient_rounds
+from sprag_study.engine.vibration_drive.strobes import (
+    ANGLE,
+    FRACTION,
+    PENDULUM_WIDTH,
+    SHAFT_SPEED,
+    SHAFT_WIDTH,
+    SPEED,
+    width,
+)
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -45,7 +53,7 @@ class SettledBatch:
     values : array, shape (cases, results)
         Results in the order of ``settled_infos(pendulums)``; NaN where a value could not be computed.
     endings : int8 array, shape (cases,)
-        Index into ``sprag.engine.endings.ENDINGS``.
+        Index into ``sprag_study.engine.endings.ENDINGS``.
     regimes : int8 array, shape (cases,)
         Members of ``Regime``.
     points : array, shape (cases, strobes.width(n))

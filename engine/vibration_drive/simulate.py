@@ -8,17 +8,17 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine import elementary
-from sprag.engine.endings import ENDINGS
-from sprag.engine.outcome import Batch, Trajectory
-from sprag.engine.run import Run, SettledRun
-from sprag.engine.vibration_drive.automaton import Clutch, Shaft
-from sprag.engine.vibration_drive.cases import case_matrix, pendulum_count, scalars
-from sprag.engine.vibration_drive.characteristics import characteristics
-from sprag.engine.vibration_drive.integration import Integration, integrate
-from sprag.engine.vibration_drive.kernel import kernel_of, order_for
-from sprag.engine.vibration_drive.layout import OUT_ENDING, PendulumSample, ShaftSample, pendulum_samples
-from sprag.engine.vibration_drive.parameters import PARAMETERS
+from sprag_study.engine import elementary
+from sprag_study.engine.endings import ENDINGS
+from sprag_study.engine.outcome import Batch, Trajectory
+from sprag_study.engine.run import Run, SettledRun
+from sprag_study.engine.vibration_drive.automaton import Clutch, Shaft
+from sprag_study.engine.vibration_drive.cases import case_matrix, pendulum_count, scalars
+from sprag_study.engine.vibration_drive.characteristics import characteristics
+from sprag_study.engine.vibration_drive.integration import Integration, integrate
+from sprag_study.engine.vibration_drive.kernel import kernel_of, order_for
+from sprag_study.engine.vibration_drive.layout import OUT_ENDING, PendulumSample, ShaftSample, pendulum_samples
+from sprag_study.engine.vibration_drive.parameters import PARAMETERS
 
 Floats = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ def simulate(columns: Mapping[str, ArrayLike], run: Run, *, cases: int) -> Batch
 
 def characteristics_names(pendulums: int) -> tuple[str, ...]:
     """Names of the result columns of a drive with that many pendulums."""
-    from sprag.engine.vibration_drive.results import result_infos
+    from sprag_study.engine.vibration_drive.results import result_infos
 
     return tuple(info.name for info in result_infos(pendulums))
 
@@ -172,7 +172,7 @@ def sampled(values: Mapping[str, float], found: Integration, times: Floats) -> T
 
 def warm_up(pendulums: int, coefficients: int, tolerance: float) -> None:
     """Generate and compile the kernel of a shape, and what settles motions, so that others load them from the cache."""
-    from sprag.engine.vibration_drive.settle import settle
+    from sprag_study.engine.vibration_drive.settle import settle
 
     columns: dict[str, float] = {"excitation.frequency": 1.0, "shaft.inertia": 1.0, "shaft.load": 1.0}
     for i in range(pendulums):

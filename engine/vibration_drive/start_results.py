@@ -1,7 +1,7 @@
 """Results of cases with many starts: those of a settled case, and those of a regime among the others."""
 
-from sprag.engine.catalogue import ResultInfo
-from sprag.engine.vibration_drive.regimes import settled_infos
+from sprag_study.engine.catalogue import ResultInfo
+from sprag_study.engine.vibration_drive.regimes import settled_infos
 
 #: Result that numbers the rows of a case.
 NUMBER = "regime.number"

@@ -5,15 +5,15 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.run import Run, SettledRun
-from sprag.engine.vibration_drive.automaton import Clutch
-from sprag.engine.vibration_drive.cases import case_matrix, pendulum_count, scalars, with_lengths
-from sprag.engine.vibration_drive.integration import integrate
-from sprag.engine.vibration_drive.kernel import kernel_of
-from sprag.engine.vibration_drive.layout import OUT_ENDING
-from sprag.engine.vibration_drive.settle import settle
-from sprag.engine.vibration_drive.strobes import (
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.run import Run, SettledRun
+from sprag_study.engine.vibration_drive.automaton import Clutch
+from sprag_study.engine.vibration_drive.cases import case_matrix, pendulum_count, scalars, with_lengths
+from sprag_study.engine.vibration_drive.integration import integrate
+from sprag_study.engine.vibration_drive.kernel import kernel_of
+from sprag_study.engine.vibration_drive.layout import OUT_ENDING
+from sprag_study.engine.vibration_drive.settle import settle
+from sprag_study.engine.vibration_drive.strobes import (
     ANGLE,
     CLUTCH,
     PENDULUM_WIDTH,
@@ -22,7 +22,7 @@ from sprag.engine.vibration_drive.strobes import (
     SPEED,
     WINDUP,
 )
-from sprag.engine.vibration_drive.sweep import whole_periods
+from sprag_study.engine.vibration_drive.sweep import whole_periods
 
 Floats = NDArray[np.float64]
 

@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.outcome import Basin
-from sprag.engine.run import SettledRun
-from sprag.engine.vibration_drive.cases import case_matrix, default_of, of_cases, pendulum_count
-from sprag.engine.vibration_drive.kernel import kernel_of
-from sprag.engine.vibration_drive.same_motions import Motions
-from sprag.engine.vibration_drive.settle import SettledBatch, settle
-from sprag.engine.vibration_drive.start_results import REGIME_INFOS, started_infos
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.outcome import Basin
+from sprag_study.engine.run import SettledRun
+from sprag_study.engine.vibration_drive.cases import case_matrix, default_of, of_cases, pendulum_count
+from sprag_study.engine.vibration_drive.kernel import kernel_of
+from sprag_study.engine.vibration_drive.same_motions import Motions
+from sprag_study.engine.vibration_drive.settle import SettledBatch, settle
+from sprag_study.engine.vibration_drive.start_results import REGIME_INFOS, started_infos
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -40,7 +40,8 @@ class StartedBatch:
     values : array, shape (cases, results)
         The most frequent regime of each case, in the order of ``started_infos(pendulums)``.
     endings : int8 array, shape (cases,)
-        Index into ``sprag.engine.endings.ENDINGS``: ok if any start ends ok, otherwise that of the case's own start.
+        Index into ``sprag_study.engine.endings.ENDINGS``: ok if any start ends ok, otherwise that of the case's own
+        start.
     further : int64 array, shape (regimes,)
         Row in ``values`` of the case of each further regime, ascending.
     further_values : array, shape (regimes, results)

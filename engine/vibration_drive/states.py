@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.compile.jit import inlined, part
-from sprag.engine.taylor.straight import horner, integral, slope
-from sprag.engine.vibration_drive.automaton import CLUTCH_THRESHOLD, Band, Clutch, Shaft, Threshold
-from sprag.engine.vibration_drive.formulas import beyond
-from sprag.engine.vibration_drive.layout import Layout
+from sprag_study.engine.compile.jit import inlined, part
+from sprag_study.engine.taylor.straight import horner, integral, slope
+from sprag_study.engine.vibration_drive.automaton import CLUTCH_THRESHOLD, Band, Clutch, Shaft, Threshold
+from sprag_study.engine.vibration_drive.formulas import beyond
+from sprag_study.engine.vibration_drive.layout import Layout
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -5,11 +5,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.compile.jit import part
-from sprag.engine.vibration_drive import states as ev
-from sprag.engine.vibration_drive.cases import STOPS, stop_column
-from sprag.engine.vibration_drive.layout import OUT_SUMS, Layout
-from sprag.engine.vibration_drive.window import energy, watch_extrema
+from sprag_study.engine.compile.jit import part
+from sprag_study.engine.vibration_drive import states as ev
+from sprag_study.engine.vibration_drive.cases import STOPS, stop_column
+from sprag_study.engine.vibration_drive.layout import OUT_SUMS, Layout
+from sprag_study.engine.vibration_drive.window import energy, watch_extrema
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

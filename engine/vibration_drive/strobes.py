@@ -10,9 +10,9 @@ resets, waits for the relative speed to fall through zero. These determine the s
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.compile.jit import part
-from sprag.engine.vibration_drive.layout import Layout
-from sprag.engine.vibration_drive.states import (
+from sprag_study.engine.compile.jit import part
+from sprag_study.engine.vibration_drive.layout import Layout
+from sprag_study.engine.vibration_drive.states import (
     BEYOND,
     ENGAGED,
     FREE,

@@ -8,15 +8,15 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.run import SettledRun
-from sprag.engine.vibration_drive.cases import Column, case_matrix, of_cases, pendulum_count, with_lengths
-from sprag.engine.vibration_drive.integration import integrate
-from sprag.engine.vibration_drive.kernel import kernel_of
-from sprag.engine.vibration_drive.layout import OUT_ENDING
-from sprag.engine.vibration_drive.regimes import Regime, settled_infos
-from sprag.engine.vibration_drive.settle import SettledBatch, settle
-from sprag.engine.vibration_drive.strobes import (
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.run import SettledRun
+from sprag_study.engine.vibration_drive.cases import Column, case_matrix, of_cases, pendulum_count, with_lengths
+from sprag_study.engine.vibration_drive.integration import integrate
+from sprag_study.engine.vibration_drive.kernel import kernel_of
+from sprag_study.engine.vibration_drive.layout import OUT_ENDING
+from sprag_study.engine.vibration_drive.regimes import Regime, settled_infos
+from sprag_study.engine.vibration_drive.settle import SettledBatch, settle
+from sprag_study.engine.vibration_drive.strobes import (
     ANGLE,
     BEGIN,
     PENDULUM_WIDTH,

@@ -9,18 +9,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.outcome import Batch
-from sprag.engine.run import Run, SettledRun
-from sprag.engine.vibration_drive.cases import STOPS, Column, case_matrix, pendulum_count, stop_column
-from sprag.engine.vibration_drive.characteristics import characteristics
-from sprag.engine.vibration_drive.integration import integrate
-from sprag.engine.vibration_drive.kernel import kernel_of
-from sprag.engine.vibration_drive.layout import OUT_ENDING
-from sprag.engine.vibration_drive.results import result_infos
-from sprag.engine.vibration_drive.search import ROUND, Search
-from sprag.engine.vibration_drive.simulate import simulate
-from sprag.engine.vibration_drive.strobes import SHAFT_SPEED, TURN, in_order
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.outcome import Batch
+from sprag_study.engine.run import Run, SettledRun
+from sprag_study.engine.vibration_drive.cases import STOPS, Column, case_matrix, pendulum_count, stop_column
+from sprag_study.engine.vibration_drive.characteristics import characteristics
+from sprag_study.engine.vibration_drive.integration import integrate
+from sprag_study.engine.vibration_drive.kernel import kernel_of
+from sprag_study.engine.vibration_drive.layout import OUT_ENDING
+from sprag_study.engine.vibration_drive.results import result_infos
+from sprag_study.engine.vibration_drive.search import ROUND, Search
+from sprag_study.engine.vibration_drive.simulate import simulate
+from sprag_study.engine.vibration_drive.strobes import SHAFT_SPEED, TURN, in_order
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

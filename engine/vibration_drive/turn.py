@@ -8,18 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.outcome import Trajectory
-from sprag.engine.run import Run, SettledRun
-from sprag.engine.vibration_drive.cases import case_matrix, scalars, with_lengths
-from sprag.engine.vibration_drive.integration import integrate
-from sprag.engine.vibration_drive.kernel import kernel_of
-from sprag.engine.vibration_drive.regimes import Regime
-from sprag.engine.vibration_drive.settle import settle
-from sprag.engine.vibration_drive.simulate import sampled
-from sprag.engine.vibration_drive.start_states import as_parameters
-from sprag.engine.vibration_drive.strobes import BEGIN
-from sprag.engine.vibration_drive.sweep import whole_periods
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.outcome import Trajectory
+from sprag_study.engine.run import Run, SettledRun
+from sprag_study.engine.vibration_drive.cases import case_matrix, scalars, with_lengths
+from sprag_study.engine.vibration_drive.integration import integrate
+from sprag_study.engine.vibration_drive.kernel import kernel_of
+from sprag_study.engine.vibration_drive.regimes import Regime
+from sprag_study.engine.vibration_drive.settle import settle
+from sprag_study.engine.vibration_drive.simulate import sampled
+from sprag_study.engine.vibration_drive.start_states import as_parameters
+from sprag_study.engine.vibration_drive.strobes import BEGIN
+from sprag_study.engine.vibration_drive.sweep import whole_periods
 
 Floats = NDArray[np.float64]
 

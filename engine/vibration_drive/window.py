@@ -3,13 +3,13 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.compile.jit import inlined, part
-from sprag.engine.elementary.angles import cosine
-from sprag.engine.taylor.batch import HARD, KNOWN, RESULT, SLOTS, STATUS, slot_start, take
-from sprag.engine.taylor.roots import RECIPROCAL, evaluate, largest
-from sprag.engine.vibration_drive.automaton import Clutch
-from sprag.engine.vibration_drive.layout import Layout, PendulumSample, ShaftSample
-from sprag.engine.vibration_drive.states import NEVER, stored_energy, total
+from sprag_study.engine.compile.jit import inlined, part
+from sprag_study.engine.elementary.angles import cosine
+from sprag_study.engine.taylor.batch import HARD, KNOWN, RESULT, SLOTS, STATUS, slot_start, take
+from sprag_study.engine.taylor.roots import RECIPROCAL, evaluate, largest
+from sprag_study.engine.vibration_drive.automaton import Clutch
+from sprag_study.engine.vibration_drive.layout import Layout, PendulumSample, ShaftSample
+from sprag_study.engine.vibration_drive.states import NEVER, stored_energy, total
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -10,7 +10,7 @@ from datetime import datetime
 from enum import Enum
 from typing import Annotated, Any, TypeVar
 
-from sprag.service.json_text import timestamp
+from sprag_study.service.json_text import timestamp
 
 A = TypeVar("A")
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, NotRequired
 
 from typing_extensions import TypedDict
 
-from sprag.service.answers import Doc
+from sprag_study.service.answers import Doc
 
 
 class ParameterInfo(TypedDict):

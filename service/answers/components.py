@@ -6,7 +6,7 @@ from typing import Annotated
 
 from typing_extensions import TypedDict
 
-from sprag.service.answers import Doc, Moment
+from sprag_study.service.answers import Doc, Moment
 
 
 class ComponentEntry(TypedDict):

@@ -6,7 +6,7 @@ from typing import Annotated, NotRequired
 
 from typing_extensions import TypedDict
 
-from sprag.service.answers import Doc, Number, Value
+from sprag_study.service.answers import Doc, Number, Value
 
 
 class Case(TypedDict):

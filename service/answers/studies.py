@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from typing_extensions import TypedDict
 
-from sprag.service.answers import Doc, Moment, Number
+from sprag_study.service.answers import Doc, Moment, Number
 
 
 class StudyOrder(StrEnum):

@@ -6,8 +6,8 @@ from typing import Annotated, Literal, NotRequired
 
 from typing_extensions import TypedDict
 
-from sprag.service.answers import Doc, Number
-from sprag.service.answers.results import ResultMeaning
+from sprag_study.service.answers import Doc, Number
+from sprag_study.service.answers.results import ResultMeaning
 
 Numbers = list[Number]
 

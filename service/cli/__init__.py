@@ -36,7 +36,7 @@ def main() -> NoReturn:
             signal.signal(number, signal.default_int_handler)
     try:
         _replace_closed_streams()
-        from sprag.service.cli.app import execute
+        from sprag_study.service.cli.app import execute
 
         code = execute(sys.argv[1:])
     except KeyboardInterrupt:  # while the program is still being loaded, or already done

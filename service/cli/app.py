@@ -15,9 +15,9 @@ import typer
 from typer.core import TyperGroup
 from typer.main import get_command
 
-from sprag.service import languages
-from sprag.service.actor import Door, act_as, of_machine
-from sprag.service.cli import (
+from sprag_study.service import languages
+from sprag_study.service.actor import Door, act_as, of_machine
+from sprag_study.service.cli import (
     calibrations,
     case_views,
     cases,
@@ -45,8 +45,8 @@ from sprag.service.cli import (
     user,
     workers,
 )
-from sprag.service.cli.completion import COMPLETION_VARIABLE
-from sprag.service.cli.console import (
+from sprag_study.service.cli.completion import COMPLETION_VARIABLE
+from sprag_study.service.cli.console import (
     CommandFailureError,
     ExitCode,
     TroubleError,
@@ -55,11 +55,11 @@ from sprag.service.cli.console import (
     write_text,
     wrong_option,
 )
-from sprag.service.cli.groups import Groups
-from sprag.service.cli.language import OPTION, VARIABLE, chosen, code_of, refusal, translate
-from sprag.service.extras import command_for
-from sprag.service.faults import FaultError, Kind
-from sprag.service.languages import N_, _
+from sprag_study.service.cli.groups import Groups
+from sprag_study.service.cli.language import OPTION, VARIABLE, chosen, code_of, refusal, translate
+from sprag_study.service.extras import command_for
+from sprag_study.service.faults import FaultError, Kind
+from sprag_study.service.languages import N_, _
 
 #: Environment variable that shows the traceback of a bug.
 DEBUG_VARIABLE = "SPRAG_DEBUG"
@@ -79,7 +79,7 @@ def _show_version(wanted: bool) -> None:
     if wanted:
         from importlib.metadata import version
 
-        write_text(f"sprag {version('sprag')}\n")
+        write_text(f"sprag {version('sprag-study')}\n")
         raise typer.Exit
 
 
@@ -209,7 +209,7 @@ class _PipeClosedError(Exception):
 
 
 def _invoke(arguments: Sequence[str]) -> int:
-    from sprag.worker.ports import ExecutorError, StoreError
+    from sprag_study.worker.ports import ExecutorError, StoreError
 
     as_json = "--json" in arguments
     try:

@@ -10,25 +10,25 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sprag.service import languages
-from sprag.service.cli.configured import read_settings
-from sprag.service.cli.console import WrongInputError, say, warning_lines, write_json
-from sprag.service.cli.file_formats import PICTURES, file_format
-from sprag.service.cli.files import MAX_DATA_BYTES, decode, read_bytes, read_spec, spec_failure, write_pieces
-from sprag.service.cli.options import (
+from sprag_study.service import languages
+from sprag_study.service.cli.configured import read_settings
+from sprag_study.service.cli.console import WrongInputError, say, warning_lines, write_json
+from sprag_study.service.cli.file_formats import PICTURES, file_format
+from sprag_study.service.cli.files import MAX_DATA_BYTES, decode, read_bytes, read_spec, spec_failure, write_pieces
+from sprag_study.service.cli.options import (
     JsonFlag,
     PictureLanguage,
     Processes,
     SpecFile,
 )
-from sprag.service.cli.running import run_parsed
-from sprag.service.cli.shown import show_calibration
-from sprag.service.cli.stores import store_of
-from sprag.service.faults import Fault
-from sprag.service.languages import N_, _
+from sprag_study.service.cli.running import run_parsed
+from sprag_study.service.cli.shown import show_calibration
+from sprag_study.service.cli.stores import store_of
+from sprag_study.service.faults import Fault
+from sprag_study.service.languages import N_, _
 
 if TYPE_CHECKING:
-    from sprag.service.spec.document import ParsedSpec
+    from sprag_study.service.spec.document import ParsedSpec
 
 _FORMS = ("csv", *PICTURES)
 _File = Annotated[
@@ -73,7 +73,7 @@ def calibrate(
 
 
 def _read(path: str, measured: str | None) -> ParsedSpec:
-    from sprag.service.spec.document import SpecError, parse_spec
+    from sprag_study.service.spec.document import SpecError, parse_spec
 
     data = read_spec(path)
     if isinstance(data, Mapping) and not isinstance(data.get("calibrate"), Mapping):
@@ -91,12 +91,12 @@ def _read(path: str, measured: str | None) -> ParsedSpec:
 @contextmanager
 def _found(parsed: ParsedSpec, db: str | None, processes: int | None) -> Iterator[Callable[[str], bytes]]:
     """Run the study to its end; what writes the calibration in a form."""
-    from sprag.service.reading.quantities import SI
-    from sprag.service.reading.reader import CAPTIONS, Choice
-    from sprag.service.results.rounds import sentence
-    from sprag.service.views.calibration import CalibrationView
-    from sprag.service.views.library import Library
-    from sprag.service.views.study_view import study_file
+    from sprag_study.service.reading.quantities import SI
+    from sprag_study.service.reading.reader import CAPTIONS, Choice
+    from sprag_study.service.results.rounds import sentence
+    from sprag_study.service.views.calibration import CalibrationView
+    from sprag_study.service.views.library import Library
+    from sprag_study.service.views.study_view import study_file
 
     settings = read_settings(database=db, processes=processes)
     if db is not None:

@@ -1,6 +1,7 @@
 """``sprag trajectory``, ``branch``, ``basin`` and their like: the views of a case, run here or by a service.
 
-Their options are the settings of the views (`sprag.service.views.setting`); nothing else is loaded before one runs.
+Their options are the settings of the views (`sprag_study.service.views.setting`); nothing else is loaded before one
+runs.
 """
 
 from __future__ import annotations
@@ -14,13 +15,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sprag.service import languages
-from sprag.service.cli import completion
-from sprag.service.cli.console import ExitCode, WrongInputError, say, write_json, wrong_option
-from sprag.service.cli.file_formats import PICTURES, value_format
-from sprag.service.cli.files import output, read_study, require_cases, to_file, write_pieces
-from sprag.service.cli.names import study_of
-from sprag.service.cli.options import (
+from sprag_study.service import languages
+from sprag_study.service.cli import completion
+from sprag_study.service.cli.console import ExitCode, WrongInputError, say, write_json, wrong_option
+from sprag_study.service.cli.file_formats import PICTURES, value_format
+from sprag_study.service.cli.files import output, read_study, require_cases, to_file, write_pieces
+from sprag_study.service.cli.names import study_of
+from sprag_study.service.cli.options import (
     DEFAULT_SERVER,
     CaseOption,
     JsonFlag,
@@ -35,16 +36,16 @@ from sprag.service.cli.options import (
     ValueFormatOption,
     in_language,
 )
-from sprag.service.cli.remote import connection
-from sprag.service.faults import Fault, FaultError, choice_of
-from sprag.service.languages import N_, _
-from sprag.service.views.case_questions import CASE_VIEWS, TRANSIENT
-from sprag.service.views.setting import NamedSetting, ViewInfo, settings_of
+from sprag_study.service.cli.remote import connection
+from sprag_study.service.faults import Fault, FaultError, choice_of
+from sprag_study.service.languages import N_, _
+from sprag_study.service.views.case_questions import CASE_VIEWS, TRANSIENT
+from sprag_study.service.views.setting import NamedSetting, ViewInfo, settings_of
 
 if TYPE_CHECKING:
-    from sprag.service.views.case_view import CaseView
-    from sprag.worker.models.transients import Course
-    from sprag.worker.study import Study
+    from sprag_study.service.views.case_view import CaseView
+    from sprag_study.worker.models.transients import Course
+    from sprag_study.worker.study import Study
 
 SpecOrStudy = Annotated[
     str,
@@ -72,7 +73,7 @@ def command(about: ViewInfo) -> Callable[..., None]:
         written = value_format(form, file, as_json, PICTURES if about.pictures else ())
         drawing = in_language(language)
         if is_study(spec):
-            from sprag.service.client.wire import case_path
+            from sprag_study.service.client.wire import case_path
 
             _refuse_local(every=every, points_file=points_file, tables=tables)
             query = [*query_of(asked, settings), *([] if start is None else [("start", str(start))]), *drawing]
@@ -82,7 +83,7 @@ def command(about: ViewInfo) -> Callable[..., None]:
                     write_pieces(file, pieces)
             _say_written(file, written, case, as_json, {})
             return
-        from sprag.service.views import cases
+        from sprag_study.service.views import cases
 
         view = cases.CASE_VIEWS[about.name]
         study = read_study(spec, points_file, files=tables).study
@@ -189,13 +190,13 @@ def _offering(choices: Sequence[str]) -> Callable[[str], list[str]]:
 
 def query_of(asked: Sequence[NamedSetting], settings: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Settings as the query of the view's address, without those that are as the service has them anyway."""
-    from sprag.service.client.queries import query_of as query
+    from sprag_study.service.client.queries import query_of as query
 
     return query({one.alias: settings[one.name] for one in asked if settings[one.name] != one.default})
 
 
 def _check_start(study: Study, start: int | None) -> None:
-    from sprag.service.results.start_states import check_start
+    from sprag_study.service.results.start_states import check_start
 
     check_start(study, start)
 
@@ -228,8 +229,8 @@ def _write(
     file: str | None, drawing: Mapping[str, str], as_json: bool,
 ) -> None:  # fmt: skip
     """Compute the view of a case, write it, and say what it has."""
-    from sprag.service.reading.reader import shown
-    from sprag.service.views.case_view import drawn, see, written
+    from sprag_study.service.reading.reader import shown
+    from sprag_study.service.views.case_view import drawn, see, written
 
     with output(file) as write:
         answer = see(study, case, view, chosen, start)
@@ -263,9 +264,9 @@ def _say_written(file: str | None, form: str, case: int, as_json: bool, data: Ma
 
 def _write_all(study: Study, course: Course, file: str | None, *, as_json: bool) -> None:
     """Write a row for each case; a line of JSON each, or CSV with a line of headings."""
-    from sprag.service.exports.text import csv_lines
-    from sprag.service.json_text import to_bytes
-    from sprag.service.views.transient import case_rows, completed, row_headings
+    from sprag_study.service.exports.text import csv_lines
+    from sprag_study.service.json_text import to_bytes
+    from sprag_study.service.views.transient import case_rows, completed, row_headings
 
     ends: Counter[str] = Counter()
     with output(file) as write:

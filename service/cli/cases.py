@@ -7,15 +7,15 @@ from typing import Annotated, Any
 
 import typer
 
-from sprag.service.cli import completion
-from sprag.service.cli.compare import pair
-from sprag.service.cli.console import WrongInputError, show_table, write_json
-from sprag.service.cli.names import study_of
-from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, OfEnding, OfFlag, OfRegime, Server, StudyId, Token
-from sprag.service.cli.remote import connection
-from sprag.service.cli.shown import heading
-from sprag.service.faults import Fault
-from sprag.service.languages import N_, _
+from sprag_study.service.cli import completion
+from sprag_study.service.cli.compare import pair
+from sprag_study.service.cli.console import WrongInputError, show_table, write_json
+from sprag_study.service.cli.names import study_of
+from sprag_study.service.cli.options import DEFAULT_SERVER, JsonFlag, OfEnding, OfFlag, OfRegime, Server, StudyId, Token
+from sprag_study.service.cli.remote import connection
+from sprag_study.service.cli.shown import heading
+from sprag_study.service.faults import Fault
+from sprag_study.service.languages import N_, _
 
 #: Most cases of one request.
 _PAGE = 500
@@ -54,8 +54,8 @@ def cases(
     as_json: JsonFlag = False,
 ) -> None:
     """List finished cases of a study, in order of their numbers or sorted over all of them."""
-    from sprag.service.client.queries import query_of
-    from sprag.service.client.wire import study_path
+    from sprag_study.service.client.queries import query_of
+    from sprag_study.service.client.wire import study_path
 
     held = dict(pair(text) for text in at or ())
     with connection(server, token) as client:

@@ -6,11 +6,11 @@ from typing import Annotated
 
 import typer
 
-from sprag.service.cli import completion
-from sprag.service.cli.console import show_table, write_json
-from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, Token
-from sprag.service.cli.remote import connection
-from sprag.service.languages import _
+from sprag_study.service.cli import completion
+from sprag_study.service.cli.console import show_table, write_json
+from sprag_study.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, Token
+from sprag_study.service.cli.remote import connection
+from sprag_study.service.languages import _
 
 
 def models(
@@ -27,7 +27,7 @@ def models(
     as_json: JsonFlag = False,
 ) -> None:
     """List the models of a service, or the parameters and results of one."""
-    from sprag.service.client.wire import model_path
+    from sprag_study.service.client.wire import model_path
 
     with connection(server, token) as client:
         found = client.request("GET", "/models" if name is None else model_path(name))

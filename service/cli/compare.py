@@ -7,14 +7,14 @@ from typing import Annotated
 
 import typer
 
-from sprag.service.answers.differing import MOST_COMPARED
-from sprag.service.cli import completion
-from sprag.service.cli.console import Column, say, show_table, write_json, wrong_option
-from sprag.service.cli.names import study_of
-from sprag.service.cli.options import DEFAULT_SERVER, CurveBy, JsonFlag, Server, Token
-from sprag.service.cli.remote import connection
-from sprag.service.cli.shown import show_curves
-from sprag.service.languages import N_, _
+from sprag_study.service.answers.differing import MOST_COMPARED
+from sprag_study.service.cli import completion
+from sprag_study.service.cli.console import Column, say, show_table, write_json, wrong_option
+from sprag_study.service.cli.names import study_of
+from sprag_study.service.cli.options import DEFAULT_SERVER, CurveBy, JsonFlag, Server, Token
+from sprag_study.service.cli.remote import connection
+from sprag_study.service.cli.shown import show_curves
+from sprag_study.service.languages import N_, _
 
 
 def compare(
@@ -51,8 +51,8 @@ def compare(
     as_json: JsonFlag = False,
 ) -> None:
     """Compare studies: the inputs in which they differ, and the same curves of each."""
-    from sprag.service.client import Study
-    from sprag.service.client import compare as side_by_side
+    from sprag_study.service.client import Study
+    from sprag_study.service.client import compare as side_by_side
 
     if not 2 <= len(studies) <= MOST_COMPARED:
         raise wrong_option(

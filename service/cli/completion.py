@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import typer
 
-from sprag.service.languages import _
-from sprag.worker.codes import ENDING_CODES, FLAG_MASKS, PENDING, REGIME_CODES
+from sprag_study.service.languages import _
+from sprag_study.worker.codes import ENDING_CODES, FLAG_MASKS, PENDING, REGIME_CODES
 
 if TYPE_CHECKING:
-    from sprag.service.client import Client
-    from sprag.service.storage.store import Store
+    from sprag_study.service.client import Client
+    from sprag_study.service.storage.store import Store
 
 #: Variable in which typer's scripts ask for completions, or people for such a script.
 COMPLETION_VARIABLE: Final = "_SPRAG_COMPLETE"
@@ -36,7 +36,7 @@ def _studies(client: Client, incomplete: str) -> list[tuple[str, str]]:
     found = client.request("GET", "/studies", params={"page_size": _OFFERED})["studies"]
     ids = [(study["id"], f"{study['name'] or study['model']}, {study['state']}") for study in found]
     names = _names(incomplete, ((study["name"], study["id"]) for study in found))
-    from sprag.service.client.synchronous.naming import LATEST
+    from sprag_study.service.client.synchronous.naming import LATEST
 
     newest = [(LATEST, ids[0][1])] if ids else []
     return [*newest, *ids, *names]
@@ -87,7 +87,7 @@ def flags() -> list[str]:
 
 def presets() -> list[tuple[str, str]]:
     """Studies that come with the program, each with what it shows."""
-    from sprag.service.presets import ABOUT, preset_names
+    from sprag_study.service.presets import ABOUT, preset_names
 
     return [(name, _(ABOUT[name].shows)) for name in preset_names()]
 
@@ -127,8 +127,8 @@ def _of_study(context: typer.Context, parts: Sequence[str]) -> list[tuple[str, s
         return []
 
     def names(client: Client) -> list[tuple[str, str]]:
-        from sprag.service.cli.names import study_of
-        from sprag.service.client.wire import case_path
+        from sprag_study.service.cli.names import study_of
+        from sprag_study.service.client.wire import case_path
 
         case = client.request("GET", case_path(study_of(client, study), 0, ""))
         return [(name, case["units"].get(name, "")) for part in parts for name in case[part]]
@@ -138,8 +138,8 @@ def _of_study(context: typer.Context, parts: Sequence[str]) -> list[tuple[str, s
 
 def _asked(context: typer.Context, ask: Callable[[Client], list[Offered]]) -> list[Offered]:
     """What the service of the command answers; nothing where none answers."""
-    from sprag.service.cli.console import CommandFailureError
-    from sprag.service.client import Client, RefusedError, UnreachableError
+    from sprag_study.service.cli.console import CommandFailureError
+    from sprag_study.service.client import Client, RefusedError, UnreachableError
 
     given: dict[str, Any] = context.params
     try:
@@ -151,10 +151,10 @@ def _asked(context: typer.Context, ask: Callable[[Client], list[Offered]]) -> li
 
 def _stored(context: typer.Context, read: Callable[[Store], Sequence[Kept]]) -> Sequence[Kept]:
     """What the database of the command has; nothing where there is none, which is not created."""
-    from sprag.service.cli.console import CommandFailureError
-    from sprag.service.cli.stores import database_of
-    from sprag.service.storage.errors import StoreError
-    from sprag.service.storage.store import Store
+    from sprag_study.service.cli.console import CommandFailureError
+    from sprag_study.service.cli.stores import database_of
+    from sprag_study.service.storage.errors import StoreError
+    from sprag_study.service.storage.store import Store
 
     try:
         with Store.open(database_of(context.params.get("db")), create=False) as store:

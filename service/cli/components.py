@@ -6,13 +6,13 @@ from typing import Annotated, Any, cast
 
 import typer
 
-from sprag.service.cli.console import say, show_table, write_json
-from sprag.service.cli.files import decode, read_bytes, read_spec, write_pieces
-from sprag.service.cli.groups import Groups
-from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, OutputFile, Server, Token
-from sprag.service.cli.remote import connection
-from sprag.service.languages import _
-from sprag.worker.limits import MAX_BODY_BYTES
+from sprag_study.service.cli.console import say, show_table, write_json
+from sprag_study.service.cli.files import decode, read_bytes, read_spec, write_pieces
+from sprag_study.service.cli.groups import Groups
+from sprag_study.service.cli.options import DEFAULT_SERVER, JsonFlag, OutputFile, Server, Token
+from sprag_study.service.cli.remote import connection
+from sprag_study.service.languages import _
+from sprag_study.worker.limits import MAX_BODY_BYTES
 
 app = typer.Typer(help="The office's own springs, clutches and motors.", no_args_is_help=True, cls=Groups)
 

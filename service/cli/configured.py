@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag.service.cli.console import WrongInputError
-from sprag.service.faults import Fault
-from sprag.service.languages import _
-from sprag.service.reading.texts import shorten
+from sprag_study.service.cli.console import WrongInputError
+from sprag_study.service.faults import Fault
+from sprag_study.service.languages import _
+from sprag_study.service.reading.texts import shorten
 
 if TYPE_CHECKING:
-    from sprag.service.settings import Settings
+    from sprag_study.service.settings import Settings
 
 
 def read_settings(**options: object) -> Settings:
@@ -20,7 +20,7 @@ def read_settings(**options: object) -> Settings:
     """
     from pydantic import ValidationError
 
-    from sprag.service.settings import ENV_PREFIX, Settings, SettingsFileError, is_secret
+    from sprag_study.service.settings import ENV_PREFIX, Settings, SettingsFileError, is_secret
 
     given = {name: value for name, value in options.items() if value is not None}
     try:

@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import typer
 
-from sprag.sentences import Sentence, WarningText
-from sprag.service import languages
-from sprag.service.cli.layout import Shape, blocks, broken, longest_piece, width_of
-from sprag.service.faults import Code, Fault, FaultError
-from sprag.service.languages import N_, _, decimal, pgettext
+from sprag_study.sentences import Sentence, WarningText
+from sprag_study.service import languages
+from sprag_study.service.cli.layout import Shape, blocks, broken, longest_piece, width_of
+from sprag_study.service.faults import Code, Fault, FaultError
+from sprag_study.service.languages import N_, _, decimal, pgettext
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -89,13 +89,13 @@ class CommandFailureError(FaultError):
 
 
 def _is_translated(fault: Fault) -> bool:
-    from sprag.service.reading.faults import is_translated
+    from sprag_study.service.reading.faults import is_translated
 
     return is_translated(fault)
 
 
 def _translated(sentence: Sentence) -> str:
-    from sprag.service.reading.faults import translated
+    from sprag_study.service.reading.faults import translated
 
     return translated(sentence)
 
@@ -107,8 +107,8 @@ def fault_line(fault: Fault) -> str:
     """
     if languages.current() == languages.ENGLISH:
         return str(fault)
-    from sprag.service.reading.faults import allowed_text, fault_text, value_text
-    from sprag.service.reading.wording import unit_text
+    from sprag_study.service.reading.faults import allowed_text, fault_text, value_text
+    from sprag_study.service.reading.wording import unit_text
 
     details = []
     if fault.value is not None:
@@ -178,10 +178,10 @@ def _warning_text(text: str, code: str | None) -> str:
     if languages.current() == languages.ENGLISH:
         return text
     if isinstance(text, WarningText) and text.sentence is not None:
-        from sprag.service.reading.reader import shown
+        from sprag_study.service.reading.reader import shown
 
         return shown(text)
-    from sprag.service.fault_meanings import WARNING_MEANINGS
+    from sprag_study.service.fault_meanings import WARNING_MEANINGS
 
     meaning = dict[str, str](WARNING_MEANINGS.items()).get(str(code or getattr(text, "code", "")))
     return _(text) if meaning is None else f"{_(meaning)} ({text})"
@@ -274,7 +274,7 @@ def time_text(time: str | None) -> str | None:
 
 def ending_lines(endings: Mapping[str, int]) -> Iterator[str]:
     """A line for each ending except ok: its number of cases and its meaning."""
-    from sprag.worker.models import ENDING_SENTENCES
+    from sprag_study.worker.models import ENDING_SENTENCES
 
     for name, count in endings.items():
         if name != OK:

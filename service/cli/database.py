@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sprag.service.cli.configured import read_settings
-from sprag.service.cli.console import ExitCode, TroubleError, WrongInputError, say, write_json
-from sprag.service.cli.files import write_pieces
-from sprag.service.cli.groups import Groups
-from sprag.service.cli.options import Database, JsonFlag, OutputFile
-from sprag.service.cli.stores import database_of, named_store
-from sprag.service.faults import FaultError
-from sprag.service.languages import _
+from sprag_study.service.cli.configured import read_settings
+from sprag_study.service.cli.console import ExitCode, TroubleError, WrongInputError, say, write_json
+from sprag_study.service.cli.files import write_pieces
+from sprag_study.service.cli.groups import Groups
+from sprag_study.service.cli.options import Database, JsonFlag, OutputFile
+from sprag_study.service.cli.stores import database_of, named_store
+from sprag_study.service.faults import FaultError
+from sprag_study.service.languages import _
 
 if TYPE_CHECKING:
-    from sprag.service.storage.database.session import Session
+    from sprag_study.service.storage.database.session import Session
 
 
 class AuditForm(StrEnum):
@@ -47,8 +47,8 @@ def upgrade(
     as_json: JsonFlag = False,
 ) -> None:
     """Bring the database to the revision of this program, or create it; stop Sprag first. It copies a file before."""
-    from sprag.service.jobs.dispatching import owner_name
-    from sprag.service.storage.alone import upgrade as bring_up
+    from sprag_study.service.jobs.dispatching import owner_name
+    from sprag_study.service.storage.alone import upgrade as bring_up
 
     done = bring_up(read_settings(database=db).database_url, owner_name(), copy=not no_backup)
     where = {"database": done.location}
@@ -68,7 +68,7 @@ def upgrade(
 @app.command()
 def check(db: Database = None, as_json: JsonFlag = False) -> None:
     """Check the whole database; takes minutes on a large one. Exit code 3 when something is wrong."""
-    from sprag.service.storage.maintenance import check as look_over
+    from sprag_study.service.storage.maintenance import check as look_over
 
     with _opened(db) as session:
         report = look_over(session)
@@ -94,7 +94,7 @@ def backup(
     as_json: JsonFlag = False,
 ) -> None:
     """Write a consistent copy of the database while others use it. Exit code 3: rows in it changed on the disk."""
-    from sprag.service.storage.maintenance import backup as write_copy
+    from sprag_study.service.storage.maintenance import backup as write_copy
 
     target = Path(file)
     if target.exists():
@@ -121,7 +121,7 @@ def prune(
     """Delete every study that ended longer ago than --older-than days, with all its results."""
     from datetime import timedelta
 
-    from sprag.service.storage.clock_watch import distrust
+    from sprag_study.service.storage.clock_watch import distrust
 
     with named_store(db, quiet=as_json) as store:
         if not dry_run and (problem := distrust(store.dispatchers)):
@@ -153,8 +153,8 @@ def move(
     The source stays as it is. The same command continues an interrupted move. Schedules and reports of the target
     are off until `sprag db adopt`. Exit code 3: rows in it changed on the disk, and were copied as they are.
     """
-    from sprag.service.jobs.dispatching import owner_name
-    from sprag.service.storage.moving import move as move_all
+    from sprag_study.service.jobs.dispatching import owner_name
+    from sprag_study.service.storage.moving import move as move_all
 
     if not target.strip():  # elsewhere it means the database of the settings
         raise WrongInputError("invalid-file", _("TARGET is empty: name a file or a URL"))
@@ -193,8 +193,8 @@ def audit(
     db: Database = None,
 ) -> None:
     """Write the audit log: who changed what, when and from where; earliest first."""
-    from sprag.service.exports.audit import audit_pieces
-    from sprag.service.storage.people.audit import audit_filter
+    from sprag_study.service.exports.audit import audit_pieces
+    from sprag_study.service.storage.people.audit import audit_filter
 
     try:
         wanted = audit_filter(since, until, actor, action, target)
@@ -217,7 +217,7 @@ def _tell_damaged(problems: Sequence[str]) -> None:
 @contextmanager
 def _opened(db: str | None, *, create: bool = False) -> Iterator[Session]:
     """Connections to the database, which is there; where it may be created, its folder is."""
-    from sprag.service.storage.database.session import Session, file_of
+    from sprag_study.service.storage.database.session import Session, file_of
 
     location = read_settings(database=db).database_url if create else database_of(db)
     file = file_of(location)

@@ -15,15 +15,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sprag.service.cli.console import ExitCode, TroubleError, say, show_table, write_json
-from sprag.service.cli.files import file_failure, write_pieces
-from sprag.service.cli.following import follow
-from sprag.service.cli.options import JsonFlag
-from sprag.service.cli.remote import connection
-from sprag.service.languages import N_, _, decimal
+from sprag_study.service.cli.console import ExitCode, TroubleError, say, show_table, write_json
+from sprag_study.service.cli.files import file_failure, write_pieces
+from sprag_study.service.cli.following import follow
+from sprag_study.service.cli.options import JsonFlag
+from sprag_study.service.cli.remote import connection
+from sprag_study.service.languages import N_, _, decimal
 
 if TYPE_CHECKING:
-    from sprag.service.client import Client
+    from sprag_study.service.client import Client
 
 PRESET = "one_pendulum"
 _STOP_SECONDS = 15.0
@@ -63,7 +63,7 @@ def demo(
 @contextmanager
 def _service(database: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
     """A service on a free port of this machine; ended with all its processes at the end of the block."""
-    command = [sys.executable, "-m", "sprag.service.cli", "serve", "--json", "--port", "0", "--db", str(database)]
+    command = [sys.executable, "-m", "sprag_study.service.cli", "serve", "--json", "--port", "0", "--db", str(database)]
     # Settings of a shared service would prevent the demonstration from accessing its own.
     environment = {name: value for name, value in os.environ.items() if name not in ("SPRAG_TOKEN", "SPRAG_HOST")}
     process = subprocess.Popen(  # noqa: S603 - this program itself
@@ -97,10 +97,10 @@ def _stop(process: subprocess.Popen[bytes]) -> None:
 
 def _show(client: Client, picture: Path, as_json: bool) -> dict[str, Any]:
     """Submit the study, follow it, show its curve and write the picture; the study at its end."""
-    from sprag.service.client.wire import study_path
-    from sprag.service.presets import preset_text
-    from sprag.service.spec.text import load_spec
-    from sprag.worker.models import cache_folder
+    from sprag_study.service.client.wire import study_path
+    from sprag_study.service.presets import preset_text
+    from sprag_study.service.spec.text import load_spec
+    from sprag_study.worker.models import cache_folder
 
     text = preset_text(PRESET)[1]
     spec = load_spec(text, "json")
@@ -129,7 +129,7 @@ def _show(client: Client, picture: Path, as_json: bool) -> dict[str, Any]:
 
 def _show_curve(curves: dict[str, Any]) -> None:
     """The mechanical characteristic as a table, the mean speed also as a bar."""
-    from sprag.worker.models import OK
+    from sprag_study.worker.models import OK
 
     (drawn,) = curves["curves"]
     columns = [

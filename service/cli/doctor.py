@@ -16,12 +16,12 @@ from typing import Annotated, Any
 
 import typer
 
-from sprag.service.cli.configured import read_settings
-from sprag.service.cli.console import ExitCode, WrongInputError, console, write_json, write_text
-from sprag.service.cli.options import Database, JsonFlag
-from sprag.service.faults import Fault
-from sprag.service.languages import N_, _, decimal, recorded
-from sprag.worker.limits import MAX_TOLERANCE, MIN_TOLERANCE
+from sprag_study.service.cli.configured import read_settings
+from sprag_study.service.cli.console import ExitCode, WrongInputError, console, write_json, write_text
+from sprag_study.service.cli.options import Database, JsonFlag
+from sprag_study.service.faults import Fault
+from sprag_study.service.languages import N_, _, decimal, recorded
+from sprag_study.worker.limits import MAX_TOLERANCE, MIN_TOLERANCE
 
 _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "sqlalchemy", "fastapi", "uvicorn")
 #: Default shape of the kernel to print.
@@ -79,7 +79,7 @@ def doctor(
 
 
 def _show_kernel(shape: dict[str, Any], as_json: bool) -> None:
-    from sprag.worker.models import MAX_COEFFICIENTS, MAX_PENDULUMS, kernel_source
+    from sprag_study.worker.models import MAX_COEFFICIENTS, MAX_PENDULUMS, kernel_source
 
     for name, most in (("pendulums", MAX_PENDULUMS), ("coefficients", MAX_COEFFICIENTS)):
         if shape[name] > most:
@@ -129,7 +129,7 @@ def _versions() -> tuple[bool, str]:
     libraries = ", ".join(f"{name} {version(name)}" for name in _LIBRARIES)
     text = _(
         "Sprag {version}, Python {python} on {system}",
-        version=version("sprag"),
+        version=version("sprag-study"),
         python=platform.python_version(),
         system=f"{platform.system()} {platform.machine()}",
     )
@@ -137,16 +137,16 @@ def _versions() -> tuple[bool, str]:
 
 
 def _sqlite() -> tuple[bool, str]:
-    from sprag.service.storage.database.sqlite_files import sqlite_version, sqlite_warning
+    from sprag_study.service.storage.database.sqlite_files import sqlite_version, sqlite_warning
 
     warning = sqlite_warning()
     return warning is None, warning or ".".join(map(str, sqlite_version()))
 
 
 def _database(url: str, file: Path | None) -> tuple[bool, str]:
-    from sprag.service.storage.database.session import Session
-    from sprag.service.storage.maintenance import MOVING, other_revision, revision
-    from sprag.service.storage.tables import HEAD_REVISION
+    from sprag_study.service.storage.database.session import Session
+    from sprag_study.service.storage.maintenance import MOVING, other_revision, revision
+    from sprag_study.service.storage.tables import HEAD_REVISION
 
     if file is not None and not file.exists():
         return True, _("{file} (not created yet)", file=file)
@@ -169,8 +169,8 @@ def _database(url: str, file: Path | None) -> tuple[bool, str]:
 
 def _rights(file: Path) -> tuple[bool, str]:
     """Whether the database and its backups are private; earlier versions created them readable by everybody."""
-    from sprag.service.jobs.maintenance import backups
-    from sprag.service.storage.database.private_files import readable_by_others
+    from sprag_study.service.jobs.maintenance import backups
+    from sprag_study.service.storage.database.private_files import readable_by_others
 
     folder = read_settings().backup_folder
     copies = [path for _, path in backups(Path(folder).expanduser())] if folder else []
@@ -184,8 +184,8 @@ def _rights(file: Path) -> tuple[bool, str]:
 
 
 def _clock(url: str, file: Path | None) -> tuple[bool, str]:
-    from sprag.service.storage.clock_watch import clock_problem
-    from sprag.service.storage.store import Store
+    from sprag_study.service.storage.clock_watch import clock_problem
+    from sprag_study.service.storage.store import Store
 
     now = _("it is {time}", time=datetime.now(UTC).isoformat(timespec="seconds"))
     if file is not None and not file.exists():
@@ -197,8 +197,8 @@ def _clock(url: str, file: Path | None) -> tuple[bool, str]:
 
 def _workers(url: str, file: Path | None) -> tuple[bool, str]:
     """Whether a dispatcher is at work and can run cases; that none runs is no fault of the installation."""
-    from sprag.service.jobs.workers import worker_list
-    from sprag.service.storage.store import Store
+    from sprag_study.service.jobs.workers import worker_list
+    from sprag_study.service.storage.store import Store
 
     if file is not None and not file.exists():
         return True, _("none yet")
@@ -230,8 +230,8 @@ def _workers(url: str, file: Path | None) -> tuple[bool, str]:
 
 def _schedules(url: str, file: Path | None) -> tuple[bool, str]:
     """Whether something has run whenever it should."""
-    from sprag.service.jobs.reports.watchdog import late_runs
-    from sprag.service.storage.store import Store
+    from sprag_study.service.jobs.reports.watchdog import late_runs
+    from sprag_study.service.storage.store import Store
 
     if file is not None and not file.exists():
         return True, _("none yet")
@@ -255,7 +255,7 @@ def _disk(location: Path) -> tuple[bool, str]:
 
 
 def _backups() -> tuple[bool, str]:
-    from sprag.service.jobs.maintenance import backups
+    from sprag_study.service.jobs.maintenance import backups
 
     folder = read_settings().backup_folder
     if not folder:
@@ -270,7 +270,7 @@ def _backups() -> tuple[bool, str]:
 
 
 def _cache() -> tuple[bool, str]:
-    from sprag.worker.models import cache_folder, cache_is_wanted
+    from sprag_study.worker.models import cache_folder, cache_is_wanted
 
     folder = cache_folder()
     folder.mkdir(parents=True, exist_ok=True)
@@ -286,7 +286,7 @@ def _cache() -> tuple[bool, str]:
 
 
 def _known_values() -> tuple[bool, str]:
-    from sprag.service.jobs.self_check import check_known_values
+    from sprag_study.service.jobs.self_check import check_known_values
 
     wrong, largest = check_known_values()
     if wrong:

@@ -6,10 +6,10 @@ from typing import Annotated
 
 import typer
 
-from sprag.service.cli import completion
-from sprag.service.cli.following import further, submitted
-from sprag.service.cli.names import study_of
-from sprag.service.cli.options import (
+from sprag_study.service.cli import completion
+from sprag_study.service.cli.following import further, submitted
+from sprag_study.service.cli.names import study_of
+from sprag_study.service.cli.options import (
     DEFAULT_SERVER,
     JsonFlag,
     OfEnding,
@@ -21,8 +21,8 @@ from sprag.service.cli.options import (
     Wait,
     WaitTimeout,
 )
-from sprag.service.cli.remote import connection
-from sprag.worker.limits import MAX_POINTS_SELECTED
+from sprag_study.service.cli.remote import connection
+from sprag_study.worker.limits import MAX_POINTS_SELECTED
 
 Where = Annotated[
     list[str] | None,
@@ -56,7 +56,7 @@ def select(
     as_json: JsonFlag = False,
 ) -> None:
     """Submit a study of the first cases within ranges of parameters and results, as points."""
-    from sprag.service.client.queries import query_of
+    from sprag_study.service.client.queries import query_of
 
     kinds = {"ending": ending, "regime": regime, "flag": flag}
     query = query_of({"where": where, "sort": sort, "limit": limit, **kinds})

@@ -7,19 +7,19 @@ from typing import Annotated, Any
 
 import typer
 
-from sprag.sentences import Name, WarningText
-from sprag.service.cli import completion
-from sprag.service.cli.console import say, warning_lines, wrong_option
-from sprag.service.cli.files import decode, read_bytes
-from sprag.service.cli.following import further, submitted
-from sprag.service.cli.names import study_of
-from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token, Wait, WaitTimeout
-from sprag.service.cli.remote import connection
-from sprag.service.languages import N_, _, ngettext
-from sprag.service.reading.numbers import assumption, could_be_one, in_language, parse_number, settle, settled
-from sprag.service.reading.printed import could_be_values
-from sprag.service.reading.together import with_last_unit
-from sprag.worker.limits import (
+from sprag_study.sentences import Name, WarningText
+from sprag_study.service.cli import completion
+from sprag_study.service.cli.console import say, warning_lines, wrong_option
+from sprag_study.service.cli.files import decode, read_bytes
+from sprag_study.service.cli.following import further, submitted
+from sprag_study.service.cli.names import study_of
+from sprag_study.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token, Wait, WaitTimeout
+from sprag_study.service.cli.remote import connection
+from sprag_study.service.languages import N_, _, ngettext
+from sprag_study.service.reading.numbers import assumption, could_be_one, in_language, parse_number, settle, settled
+from sprag_study.service.reading.printed import could_be_values
+from sprag_study.service.reading.together import with_last_unit
+from sprag_study.worker.limits import (
     MAX_BODY_BYTES,
     MAX_NARROW_STEPS,
     MAX_SETTLED_PERIODS,
@@ -49,7 +49,7 @@ def extend(
     as_json: JsonFlag = False,
 ) -> None:
     """Submit a study with more values on the axes of an old one, or more cases; only new cases are run."""
-    from sprag.service.client.wire import study_path
+    from sprag_study.service.client.wire import study_path
 
     addition = _addition(axis or [], points)
     with connection(server, token) as client:
@@ -87,7 +87,7 @@ def longer(
     as_json: JsonFlag = False,
 ) -> None:
     """Submit a study of the unsettled cases of another, with more time for each."""
-    from sprag.service.client.queries import query_of
+    from sprag_study.service.client.queries import query_of
 
     with connection(server, token) as client:
         study = further(

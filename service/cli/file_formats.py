@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from pathlib import PurePath
 from typing import Final, Literal
 
-from sprag.service.cli.console import WrongInputError, wrong_option
-from sprag.service.cli.files import to_file
-from sprag.service.cli.options import ValueFormat
-from sprag.service.formats import REPORT_FORMATS, SUFFIXES, Format, Header, ReportFormat, format_of
-from sprag.service.languages import N_, _
+from sprag_study.service.cli.console import WrongInputError, wrong_option
+from sprag_study.service.cli.files import to_file
+from sprag_study.service.cli.options import ValueFormat
+from sprag_study.service.formats import REPORT_FORMATS, SUFFIXES, Format, Header, ReportFormat, format_of
+from sprag_study.service.languages import N_, _
 
-#: Formats of a whole study: case rows (`sprag.service.exports`) and documents (`sprag.service.report`).
+#: Formats of a whole study: case rows (`sprag_study.service.exports`) and documents (`sprag_study.service.report`).
 TableFormat = Literal[Format, ReportFormat]
 #: Formats of pictures.
 PICTURES: Final = ("svg", "png", "pdf")

@@ -13,18 +13,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Literal, cast
 
-from sprag.service.cli.console import CommandFailureError, TroubleError, WrongInputError, wrong_option
-from sprag.service.cli.table_files import named, with_tables
-from sprag.service.faults import Fault, Kind
-from sprag.service.languages import N_, _
-from sprag.service.spec.report import SpecError
-from sprag.service.spec.table_text import decoded
-from sprag.service.stale_files import mark, sweep
-from sprag.worker.limits import MAX_BODY_BYTES
+from sprag_study.service.cli.console import CommandFailureError, TroubleError, WrongInputError, wrong_option
+from sprag_study.service.cli.table_files import named, with_tables
+from sprag_study.service.faults import Fault, Kind
+from sprag_study.service.languages import N_, _
+from sprag_study.service.spec.report import SpecError
+from sprag_study.service.spec.table_text import decoded
+from sprag_study.service.stale_files import mark, sweep
+from sprag_study.worker.limits import MAX_BODY_BYTES
 
 if TYPE_CHECKING:
-    from sprag.service.spec.document import ParsedSpec
-    from sprag.worker.study import Study
+    from sprag_study.service.spec.document import ParsedSpec
+    from sprag_study.worker.study import Study
 
 #: Largest file of measured data: far more rows than any clutch test has.
 MAX_DATA_BYTES = 16 * 1024 * 1024
@@ -98,7 +98,7 @@ def read_spec(
     The cases of the CSV file ``points``, if given, replace the spec's axes; it may have ``limit`` bytes. The
     CSV files of ``files`` (``PLACE=FILE``) are tables of the machine. Raises WrongInputError with every problem found.
     """
-    from sprag.service.spec.text import load_spec
+    from sprag_study.service.spec.text import load_spec
 
     tables = named(files or ())
 
@@ -129,7 +129,7 @@ def read_study(
 
     Raises WrongInputError with every problem found.
     """
-    from sprag.service.spec.document import parse_spec
+    from sprag_study.service.spec.document import parse_spec
 
     data = read_spec(path, points, files=files)
     with naming_points(points):

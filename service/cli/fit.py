@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sprag.service.cli.console import (
+from sprag_study.service.cli.console import (
     WrongInputError,
     cell_text,
     say,
@@ -18,16 +18,16 @@ from sprag.service.cli.console import (
     write_text,
     wrong_option,
 )
-from sprag.service.cli.files import MAX_DATA_BYTES, decode, read_bytes
-from sprag.service.cli.options import JsonFlag
-from sprag.service.faults import Fault, warned
-from sprag.service.languages import N_, _
-from sprag.service.reading.numbers import parse_number
-from sprag.service.reading.texts import shorten
+from sprag_study.service.cli.files import MAX_DATA_BYTES, decode, read_bytes
+from sprag_study.service.cli.options import JsonFlag
+from sprag_study.service.faults import Fault, warned
+from sprag_study.service.languages import N_, _
+from sprag_study.service.reading.numbers import parse_number
+from sprag_study.service.reading.texts import shorten
 
 if TYPE_CHECKING:
-    from sprag.service.spec.measured import MeasuredData
-    from sprag.worker.models import ClutchFit, DegreeReport
+    from sprag_study.service.spec.measured import MeasuredData
+    from sprag_study.worker.models import ClutchFit, DegreeReport
 
 _DEGREE_COLUMNS = (
     (N_("degree"), True),
@@ -80,7 +80,7 @@ def fit(
         angles_include_backlash=angles_include_backlash,
     )
     if as_json:
-        from sprag.service.results.fits import fit_json
+        from sprag_study.service.results.fits import fit_json
 
         write_json({**fit_json(made), **warned((*measured.warnings, *made.warnings))})
     else:
@@ -89,7 +89,7 @@ def fit(
 
 def _quantity(option: str, text: str, unit: str) -> float:
     """The SI number of an option: a plain number in ``unit`` or a text with its own unit."""
-    from sprag.service.reading.units import QuantityError, parse_quantity
+    from sprag_study.service.reading.units import QuantityError, parse_quantity
 
     number = parse_number(text)
     try:
@@ -99,8 +99,8 @@ def _quantity(option: str, text: str, unit: str) -> float:
 
 
 def _measured(path: str) -> MeasuredData:
-    from sprag.service.reading.units import parse_quantity
-    from sprag.service.spec.measured import MeasuredDataError, parse_measured
+    from sprag_study.service.reading.units import parse_quantity
+    from sprag_study.service.spec.measured import MeasuredDataError, parse_measured
 
     try:
         return parse_measured(decode(path, read_bytes(path, MAX_DATA_BYTES)), parse_quantity)
@@ -109,7 +109,7 @@ def _measured(path: str) -> MeasuredData:
 
 
 def _fitted(measured: MeasuredData, *, accuracy: float, **options: Any) -> ClutchFit:
-    from sprag.worker.models import ClutchFitError, fit_clutch
+    from sprag_study.worker.models import ClutchFitError, fit_clutch
 
     try:
         return fit_clutch(measured.rows, accuracy, **options)

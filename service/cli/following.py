@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from sprag.service.cli.console import (
+from sprag_study.service.cli.console import (
     OK,
     ExitCode,
     progress_bar,
@@ -18,16 +18,16 @@ from sprag.service.cli.console import (
     warning_lines,
     write_json,
 )
-from sprag.service.languages import _, earlier
-from sprag.worker.states import TERMINAL, StudyState
+from sprag_study.service.languages import _, earlier
+from sprag_study.worker.states import TERMINAL, StudyState
 
 if TYPE_CHECKING:
-    from sprag.service.client import Client
+    from sprag_study.service.client import Client
 
 
 def further(client: Client, study_id: str, verb: str, **arguments: Any) -> dict[str, Any]:
     """The study that a verb of another one submits."""
-    from sprag.service.client.wire import study_path
+    from sprag_study.service.client.wire import study_path
 
     with submitting():
         return client.request("POST", f"{study_path(study_id)}:{verb}", key="", **arguments)
@@ -50,8 +50,8 @@ def follow(client: Client, study_id: str, timeout: float | None = None, *, patie
     For a held study the reason is printed, and watching continues until it is resumed or cancelled. The same applies to
     a service that does not answer; with ``patient`` false, the command fails instead.
     """
-    from sprag.service.client.synchronous.following import wait_for
-    from sprag.service.client.waiting import Waiting
+    from sprag_study.service.client.synchronous.following import wait_for
+    from sprag_study.service.client.waiting import Waiting
 
     reasons: set[str | None] = set()
     with progress_bar(study_id) as update:

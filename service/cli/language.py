@@ -12,8 +12,8 @@ from typing import Any, Final, cast
 
 import typer
 
-from sprag.service import languages
-from sprag.service.languages import ENGLISH, N_, _
+from sprag_study.service import languages
+from sprag_study.service.languages import ENGLISH, N_, _
 
 OPTION: Final = "--language"
 VARIABLE: Final = "SPRAG_LANGUAGE"

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sprag.service.cli import completion
-from sprag.service.cli.configured import read_settings
-from sprag.service.cli.console import (
+from sprag_study.service.cli import completion
+from sprag_study.service.cli.configured import read_settings
+from sprag_study.service.cli.console import (
     ExitCode,
     WrongInputError,
     duration_text,
@@ -28,9 +28,9 @@ from sprag.service.cli.console import (
     write_text,
     wrong_option,
 )
-from sprag.service.cli.file_formats import TableFormat, require_csv, require_report, table_format
-from sprag.service.cli.files import output, read_study, to_file
-from sprag.service.cli.options import (
+from sprag_study.service.cli.file_formats import TableFormat, require_csv, require_report, table_format
+from sprag_study.service.cli.files import output, read_study, to_file
+from sprag_study.service.cli.options import (
     Appendix,
     ChunkCases,
     CsvHeader,
@@ -43,19 +43,19 @@ from sprag.service.cli.options import (
     SpecFile,
     TableFiles,
 )
-from sprag.service.cli.running import run_parsed
-from sprag.service.faults import warned
-from sprag.service.languages import N_, _, decimal
+from sprag_study.service.cli.running import run_parsed
+from sprag_study.service.faults import warned
+from sprag_study.service.languages import N_, _, decimal
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from sprag.service.formats import Format, Header
-    from sprag.service.jobs.local import LocalRun
-    from sprag.service.report import ReportFormat
-    from sprag.service.settings import Settings
-    from sprag.service.spec.document import ParsedSpec
-    from sprag.service.storage.studies.records import Progress, StudyRecord
+    from sprag_study.service.formats import Format, Header
+    from sprag_study.service.jobs.local import LocalRun
+    from sprag_study.service.report import ReportFormat
+    from sprag_study.service.settings import Settings
+    from sprag_study.service.spec.document import ParsedSpec
+    from sprag_study.service.storage.studies.records import Progress, StudyRecord
 
 
 #: Rough start time (s) of the program and its pool of processes.
@@ -102,8 +102,8 @@ def preview(
     as_json: JsonFlag = False,
 ) -> None:
     """Preview a study: number of cases, time, size, first cases. Nothing is run."""
-    from sprag.service.jobs.preview import preview_json
-    from sprag.worker.chunking import Chunking
+    from sprag_study.service.jobs.preview import preview_json
+    from sprag_study.worker.chunking import Chunking
 
     finish = _finish(finish_by)
     left = None if finish is None else (finish - datetime.now(UTC)).total_seconds()
@@ -151,8 +151,8 @@ def _show_preview(made: Mapping[str, Any]) -> None:
 
 def _reusable(settings: Settings, parsed: ParsedSpec) -> int:
     """Number of cases in the database; 0 where there is no database yet."""
-    from sprag.service.storage.database.session import file_of
-    from sprag.service.storage.store import Store
+    from sprag_study.service.storage.database.session import file_of
+    from sprag_study.service.storage.store import Store
 
     file = file_of(settings.database_url)
     if file is not None and not file.exists():
@@ -173,7 +173,7 @@ def presets(
     as_json: JsonFlag = False,
 ) -> None:
     """List the studies that come with the program, or print the spec of one."""
-    from sprag.service.presets import ABOUT, preset_names, preset_text
+    from sprag_study.service.presets import ABOUT, preset_names, preset_text
 
     names = preset_names()
     if name is None:
@@ -215,7 +215,7 @@ def run(
     as_json: JsonFlag = False,
 ) -> None:
     """Run a study here, without a service: rows or a report to standard output or FILE, progress on standard error."""
-    from sprag.service.results.unaffected import Unaffected
+    from sprag_study.service.results.unaffected import Unaffected
 
     finish, written = _finish(finish_by), table_format(form, file, as_json)
     require_csv(header, written)
@@ -250,7 +250,7 @@ def run(
         study_id = record.id if db is not None else None
         write_json({"file": file, "study": study_id, **numbers, "endings": endings, "seconds": round(seconds, 3)})
     if record.time_over:
-        from sprag.service.reading.reader import told
+        from sprag_study.service.reading.reader import told
 
         say(told(record.reason or ""))
     if record.ok != record.cases:
@@ -259,7 +259,7 @@ def run(
 
 def _rounds(progress: Progress) -> Iterator[str]:
     """What is known of a study that chooses its own cases."""
-    from sprag.service.results.rounds import sentence
+    from sprag_study.service.results.rounds import sentence
 
     if progress.rounds is not None:
         yield sentence(progress.rounds, progress.state)
@@ -278,9 +278,9 @@ def _done(record: StudyRecord, seconds: float, *, kept: bool) -> Iterator[str]:
 
 def _with_start(settings: Settings, spec: object) -> object:
     """The spec with the initial values of the case in the database from whose end it starts, if it names one."""
-    from sprag.service.jobs.start_from import with_start
-    from sprag.service.spec.machine.drive import START
-    from sprag.service.storage.store import Store
+    from sprag_study.service.jobs.start_from import with_start
+    from sprag_study.service.spec.machine.drive import START
+    from sprag_study.service.storage.store import Store
 
     base = spec.get("base") if isinstance(spec, Mapping) else None
     if not (isinstance(base, Mapping) and START in base):
@@ -290,7 +290,7 @@ def _with_start(settings: Settings, spec: object) -> object:
 
 
 def _remark(now: Progress, finish_by: str | None) -> str:
-    from sprag.service.results.rounds import sentence
+    from sprag_study.service.results.rounds import sentence
 
     rounds = None if now.rounds is None else sentence(now.rounds, now.state)
     return progress_text(now.state, now.rate, now.seconds_left, finish_by, now.in_time, rounds)
@@ -299,7 +299,7 @@ def _remark(now: Progress, finish_by: str | None) -> str:
 @contextmanager
 def _telling_what_is_kept() -> Iterator[None]:
     """After Ctrl-C, report the state of the study and how to continue it."""
-    from sprag.service.jobs.local import RunInterruptedError
+    from sprag_study.service.jobs.local import RunInterruptedError
 
     try:
         yield
@@ -320,7 +320,7 @@ def _telling_what_is_kept() -> Iterator[None]:
 
 def _finish(text: str | None) -> datetime | None:
     """The deadline of an option; WrongInputError when it is invalid."""
-    from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at
+    from sprag_study.service.schedules.deadline import ALLOWED, FinishError, finish_at
 
     try:
         return None if text is None else finish_at(text, datetime.now(UTC))
@@ -330,11 +330,11 @@ def _finish(text: str | None) -> datetime | None:
 
 def _rows(done: LocalRun, form: Format | ReportFormat, header: Header, appendix: list[str] | None) -> Iterator[bytes]:
     """The rows of a finished study as the service exports them, or its report."""
-    from sprag.service.exports import export, stored
-    from sprag.service.reading.reader import Choice
-    from sprag.service.report import Office, report_file
-    from sprag.service.views.library import Library
-    from sprag.service.views.study_questions import ReportQuestion
+    from sprag_study.service.exports import export, stored
+    from sprag_study.service.reading.reader import Choice
+    from sprag_study.service.report import Office, report_file
+    from sprag_study.service.views.library import Library
+    from sprag_study.service.views.study_questions import ReportQuestion
 
     if form == "html" or form == "pdf":  # noqa: PLR1714 - narrows the type
         settings = read_settings()

@@ -6,18 +6,18 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from sprag.service.cli.console import WrongInputError, wrong_option
-from sprag.service.faults import Fault
-from sprag.service.languages import N_, _
+from sprag_study.service.cli.console import WrongInputError, wrong_option
+from sprag_study.service.faults import Fault
+from sprag_study.service.languages import N_, _
 
 if TYPE_CHECKING:
-    from sprag.service.client import Client
-    from sprag.service.storage.people.people import People
+    from sprag_study.service.client import Client
+    from sprag_study.service.storage.people.people import People
 
 
 def study_of(client: Client, text: str) -> str:
     """The id of the study that is meant, as the client finds it; WrongInputError where several fit or none is named."""
-    from sprag.service.client.synchronous import naming
+    from sprag_study.service.client.synchronous import naming
 
     with _one("ID", text, _("the id or name of a study, or latest"), _("the study is not unique")):
         return naming.study_of(client, text)
@@ -25,7 +25,7 @@ def study_of(client: Client, text: str) -> str:
 
 def schedule_of(client: Client, text: str) -> str:
     """The id of the schedule that is meant; errors as of `study_of`."""
-    from sprag.service.client.synchronous import naming
+    from sprag_study.service.client.synchronous import naming
 
     with _one("ID", text, _("the id or name of a schedule"), _("the schedule is not unique")):
         return naming.schedule_of(client, text)
@@ -33,7 +33,7 @@ def schedule_of(client: Client, text: str) -> str:
 
 def token_of(people: People, text: str) -> str:
     """The id of the token that is meant, of one that is revoked by its id only; errors as of `study_of`."""
-    from sprag.service.client.matching import Named, meant
+    from sprag_study.service.client.matching import Named, meant
 
     with _one("ID", text, _("the id or name of a token"), _("the token is not unique")):
         tokens = [Named(t.id, t.name, f"{t.id} ({t.name})") for t in people.tokens() if t.revoked_at is None]
@@ -42,7 +42,7 @@ def token_of(people: People, text: str) -> str:
 
 def user_of(people: People, text: str, where: str = "NAME") -> str:
     """The name of the user who is meant by ``where`` of a command; errors as of `study_of`."""
-    from sprag.service.client.matching import Named, meant
+    from sprag_study.service.client.matching import Named, meant
 
     with _one(where, text, _("the name of a user"), _("the user is not unique")):
         return meant(text, [Named(user.name, user.name, user.name) for user in people.users()], "users")
@@ -51,7 +51,7 @@ def user_of(people: People, text: str, where: str = "NAME") -> str:
 @contextmanager
 def _one(where: str, text: str, allowed: str, several: str) -> Iterator[None]:
     """WrongInputError for an empty text, and where several fit."""
-    from sprag.service.client import AmbiguousError
+    from sprag_study.service.client import AmbiguousError
 
     if not text.strip():
         raise wrong_option(where, "required", N_("must not be empty"), text, allowed=allowed)

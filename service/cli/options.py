@@ -8,10 +8,10 @@ from typing import Annotated
 
 import typer
 
-from sprag.service.cli import completion
-from sprag.service.formats import Header
-from sprag.service.views.study_questions import CHAPTERS
-from sprag.worker.limits import MAX_STARTS
+from sprag_study.service.cli import completion
+from sprag_study.service.formats import Header
+from sprag_study.service.views.study_questions import CHAPTERS
+from sprag_study.worker.limits import MAX_STARTS
 
 #: Default address of `sprag serve`.
 DEFAULT_SERVER = "http://127.0.0.1:8000"

@@ -8,11 +8,11 @@ from typing import Annotated
 
 import typer
 
-from sprag.service import languages
-from sprag.service.cli.configured import read_settings
-from sprag.service.cli.console import TroubleError, WrongInputError, write_json
-from sprag.service.cli.options import ChunkCases, Database, JsonFlag, Processes
-from sprag.service.cli.stores import database_of
+from sprag_study.service import languages
+from sprag_study.service.cli.configured import read_settings
+from sprag_study.service.cli.console import TroubleError, WrongInputError, write_json
+from sprag_study.service.cli.options import ChunkCases, Database, JsonFlag, Processes
+from sprag_study.service.cli.stores import database_of
 
 Host = Annotated[
     str | None, typer.Option("--host", metavar="ADDRESS", help="Address to listen on; default: this machine only.")
@@ -40,10 +40,10 @@ def serve(
     """Start the service and its worker; Ctrl-C ends both. With --json the address is printed on standard output."""
     # What is imported stays: looking for garbage among it would take a fifth of the time of the start.
     gc.disable()
-    from sprag.service.http.server import AddressError
-    from sprag.service.http.server import serve as run_service
-    from sprag.service.http.tls import CertificateError
-    from sprag.service.settings import UnsafeSettingsError
+    from sprag_study.service.http.server import AddressError
+    from sprag_study.service.http.server import serve as run_service
+    from sprag_study.service.http.tls import CertificateError
+    from sprag_study.service.settings import UnsafeSettingsError
 
     gc.freeze()
     gc.enable()
@@ -83,8 +83,8 @@ def worker(
     ] = False,
 ) -> None:
     """Run the studies of a database without a service; Ctrl-C ends it."""
-    from sprag.service import logs
-    from sprag.service.jobs.dispatching import run_dispatcher, stop_on_signals, worker_settings
+    from sprag_study.service import logs
+    from sprag_study.service.jobs.dispatching import run_dispatcher, stop_on_signals, worker_settings
 
     settings = read_settings(database=db, processes=processes)
     database_of(db)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from sprag.service.cli.console import show_table, write_json, wrong_option
-from sprag.service.cli.files import read_study, require_cases
-from sprag.service.cli.options import CaseOption, JsonFlag, PointsFile, SpecFile
-from sprag.service.languages import N_, _
+from sprag_study.service.cli.console import show_table, write_json, wrong_option
+from sprag_study.service.cli.files import read_study, require_cases
+from sprag_study.service.cli.options import CaseOption, JsonFlag, PointsFile, SpecFile
+from sprag_study.service.languages import N_, _
 
 #: What is shown of each regime.
 _SHOWN = (
@@ -18,9 +18,9 @@ def regimes(spec: SpecFile, case: CaseOption = 0, points: PointsFile = None, as_
     """The regimes to which one case comes from its many starts, with their shares."""
     import numpy as np
 
-    from sprag.worker.models import run_chunk, study_results
-    from sprag.worker.models.starts import has_starts
-    from sprag.worker.reuse import taken
+    from sprag_study.worker.models import run_chunk, study_results
+    from sprag_study.worker.models.starts import has_starts
+    from sprag_study.worker.reuse import taken
 
     study = read_study(spec, points).study
     require_cases(study, [case])

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
 
 import typer
 
-from sprag.service.cli import completion
-from sprag.service.cli.console import (
+from sprag_study.service.cli import completion
+from sprag_study.service.cli.console import (
     CommandFailureError,
     TroubleError,
     WrongInputError,
@@ -21,11 +21,11 @@ from sprag.service.cli.console import (
     write_json,
     wrong_option,
 )
-from sprag.service.cli.file_formats import TableFormat, require_csv, table_format
-from sprag.service.cli.files import naming_points, read_spec, to_file, write_pieces
-from sprag.service.cli.following import exit_as, follow, outlived, show_study, submitted, submitting
-from sprag.service.cli.names import study_of
-from sprag.service.cli.options import (
+from sprag_study.service.cli.file_formats import TableFormat, require_csv, table_format
+from sprag_study.service.cli.files import naming_points, read_spec, to_file, write_pieces
+from sprag_study.service.cli.following import exit_as, follow, outlived, show_study, submitted, submitting
+from sprag_study.service.cli.names import study_of
+from sprag_study.service.cli.options import (
     DEFAULT_SERVER,
     Appendix,
     CsvHeader,
@@ -44,13 +44,13 @@ from sprag.service.cli.options import (
     WaitTimeout,
     in_units,
 )
-from sprag.service.faults import Fault, Kind
-from sprag.service.formats import Format
-from sprag.service.languages import N_, _, earlier
-from sprag.worker.limits import MAX_BODY_BYTES, MAX_PRIORITY
+from sprag_study.service.faults import Fault, Kind
+from sprag_study.service.formats import Format
+from sprag_study.service.languages import N_, _, earlier
+from sprag_study.worker.limits import MAX_BODY_BYTES, MAX_PRIORITY
 
 if TYPE_CHECKING:
-    from sprag.service.client import Client, Query, RefusedError
+    from sprag_study.service.client import Client, Query, RefusedError
 
 #: A parameter as in the service's messages: "by=", "at=shaft.load=0.2".
 _PARAMETER_IN_TEXT = re.compile(r"(?<![\w.-])(x|y|by|at)=(?=(\w?))")
@@ -64,7 +64,7 @@ PriorityOption = Annotated[
 @contextmanager
 def connection(server: str, token: str | None) -> Iterator[Client]:
     """A client of the service; its errors become failures of the command."""
-    from sprag.service.client import (
+    from sprag_study.service.client import (
         ArgumentError,
         Client,
         RefusedError,
@@ -153,7 +153,7 @@ def submit(
     as_json: JsonFlag = False,
 ) -> None:
     """Submit a study to the service and print its id."""
-    from sprag.service.client.queries import query_of
+    from sprag_study.service.client.queries import query_of
 
     data = read_spec(spec, points, MAX_BODY_BYTES, tables)
     query = query_of({"priority": priority or None, "fresh": fresh, "finish_by": finish_by})
@@ -171,7 +171,7 @@ def watch(
     as_json: JsonFlag = False,
 ) -> None:
     """Follow a study until it has ended, even across restarts of the service."""
-    from sprag.service.client.wire import study_path, within
+    from sprag_study.service.client.wire import study_path, within
 
     with connection(server, token) as client:
         study_id = study_of(client, study_id)
@@ -184,7 +184,7 @@ def watch(
 
 def act_on(study_id: str, verb: str, server: str, token: str | None, as_json: bool, query: Query = ()) -> None:
     """Let the service do ``verb`` with a study, and print it."""
-    from sprag.service.client.wire import study_path
+    from sprag_study.service.client.wire import study_path
 
     with connection(server, token) as client:
         study_id = study_of(client, study_id)
@@ -241,7 +241,7 @@ def prioritize(
 
 def rounds(study_id: StudyId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False) -> None:
     """List the rounds of a study that chooses its own cases, with what was known before each."""
-    from sprag.service.client.wire import study_path
+    from sprag_study.service.client.wire import study_path
 
     with connection(server, token) as client:
         study_id = study_of(client, study_id)
@@ -304,7 +304,7 @@ def export(
     as_json: JsonFlag = False,
 ) -> None:
     """Write all case rows of a study, or a report of it, to a file or to standard output."""
-    from sprag.service.client.wire import study_path
+    from sprag_study.service.client.wire import study_path
 
     chosen = table_format(form, file, as_json)
     with connection(server, token) as client:

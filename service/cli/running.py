@@ -5,17 +5,17 @@ from __future__ import annotations
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from sprag.service.cli.console import progress_bar
-from sprag.service.languages import _
+from sprag_study.service.cli.console import progress_bar
+from sprag_study.service.languages import _
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from datetime import datetime
 
-    from sprag.service.jobs.local import LocalRun
-    from sprag.service.settings import Settings
-    from sprag.service.spec.document import ParsedSpec
-    from sprag.service.storage.studies.records import Progress
+    from sprag_study.service.jobs.local import LocalRun
+    from sprag_study.service.settings import Settings
+    from sprag_study.service.spec.document import ParsedSpec
+    from sprag_study.service.storage.studies.records import Progress
 
 
 @contextmanager
@@ -35,7 +35,7 @@ def run_parsed(
     ``db`` and ``processes`` are the options of the command. ``title`` stands beside the bar, instead of "study", where
     the study has no name; ``remark`` behind it.
     """
-    from sprag.service.jobs.local import pool_size, run_here
+    from sprag_study.service.jobs.local import pool_size, run_here
 
     local = settings.executor == "pool"
     most = settings.pool_processes

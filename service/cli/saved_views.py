@@ -8,11 +8,11 @@ from urllib.parse import urlsplit
 
 import typer
 
-from sprag.service.cli.console import say, show_table, write_json, wrong_option
-from sprag.service.cli.groups import Groups
-from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, Token
-from sprag.service.cli.remote import connection
-from sprag.service.languages import N_, _
+from sprag_study.service.cli.console import say, show_table, write_json, wrong_option
+from sprag_study.service.cli.groups import Groups
+from sprag_study.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, Token
+from sprag_study.service.cli.remote import connection
+from sprag_study.service.languages import N_, _
 
 app = typer.Typer(help="Saved views of pages, and the figures of a study's report.", no_args_is_help=True, cls=Groups)
 
@@ -73,7 +73,7 @@ def change(
     as_json: JsonFlag = False,
 ) -> None:
     """Rename a view, or change whether and where it is in the report of its study."""
-    from sprag.service.client.wire import view_path
+    from sprag_study.service.client.wire import view_path
 
     given = {"name": name, "in_report": report, "place": place}
     fields = {key: value for key, value in given.items() if value is not None}

@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from sprag.service.cli import completion
-from sprag.service.cli.console import ExitCode, WrongInputError, say, show_table, write_json, wrong_option
-from sprag.service.cli.files import read_spec
-from sprag.service.cli.groups import Groups
-from sprag.service.cli.names import schedule_of
-from sprag.service.cli.options import DEFAULT_SERVER, Fresh, JsonFlag, Server, SpecFile, Token
-from sprag.service.cli.remote import PriorityOption, connection
-from sprag.service.languages import N_, _, earlier
-from sprag.worker.limits import MAX_PRIORITY
+from sprag_study.service.cli import completion
+from sprag_study.service.cli.console import ExitCode, WrongInputError, say, show_table, write_json, wrong_option
+from sprag_study.service.cli.files import read_spec
+from sprag_study.service.cli.groups import Groups
+from sprag_study.service.cli.names import schedule_of
+from sprag_study.service.cli.options import DEFAULT_SERVER, Fresh, JsonFlag, Server, SpecFile, Token
+from sprag_study.service.cli.remote import PriorityOption, connection
+from sprag_study.service.languages import N_, _, earlier
+from sprag_study.worker.limits import MAX_PRIORITY
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -177,7 +177,7 @@ def show(
     schedule_id: ScheduleId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False
 ) -> None:
     """Show a schedule and the outcome of its latest due times; with --json also its spec."""
-    from sprag.service.client.wire import schedule_path
+    from sprag_study.service.client.wire import schedule_path
 
     with connection(server, token) as client:
         schedule = client.request("GET", schedule_path(schedule_of(client, schedule_id)))
@@ -283,7 +283,7 @@ def resume(
 @app.command()
 def delete(schedule_id: ScheduleId, server: Server = DEFAULT_SERVER, token: Token = None) -> None:
     """Delete a schedule; its studies are kept."""
-    from sprag.service.client.wire import schedule_path
+    from sprag_study.service.client.wire import schedule_path
 
     with connection(server, token) as client:
         schedule_id = schedule_of(client, schedule_id)
@@ -292,7 +292,7 @@ def delete(schedule_id: ScheduleId, server: Server = DEFAULT_SERVER, token: Toke
 
 
 def _change(schedule_id: str, fields: Mapping[str, Any], server: str, token: str | None, as_json: bool) -> None:
-    from sprag.service.client.wire import schedule_path
+    from sprag_study.service.client.wire import schedule_path
 
     with connection(server, token) as client:
         _show(client.request("PATCH", schedule_path(schedule_of(client, schedule_id)), json=dict(fields)), as_json)

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Final
 
-from sprag.service.cli.configured import read_settings
-from sprag.service.cli.console import WrongInputError, show_table, write_json
-from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag
-from sprag.service.faults import Fault
-from sprag.service.languages import N_, _
+from sprag_study.service.cli.configured import read_settings
+from sprag_study.service.cli.console import WrongInputError, show_table, write_json
+from sprag_study.service.cli.options import DEFAULT_SERVER, JsonFlag
+from sprag_study.service.faults import Fault
+from sprag_study.service.languages import N_, _
 
 #: Environment variables that are not settings of the service, each with its meaning.
 VARIABLES: Final = {
@@ -58,7 +58,14 @@ def _of_service() -> Iterator[EffectiveSetting]:
     found = read_settings()
     from pydantic import SecretStr
 
-    from sprag.service.settings import ENV_PREFIX, FILE_VARIABLE, Settings, default_database_path, read_file, shown
+    from sprag_study.service.settings import (
+        ENV_PREFIX,
+        FILE_VARIABLE,
+        Settings,
+        default_database_path,
+        read_file,
+        shown,
+    )
 
     file, environment = read_file(Settings), {name.upper() for name, value in os.environ.items() if value}
     for name in Settings.model_fields:
@@ -72,7 +79,7 @@ def _of_service() -> Iterator[EffectiveSetting]:
 def _of_commands() -> Iterator[EffectiveSetting]:
     """Every other variable, by its own name."""
     try:
-        from sprag.worker import models
+        from sprag_study.worker import models
     except ValueError as error:  # the engine refuses an unknown SPRAG_COMPILER
         where = "SPRAG_COMPILER"
         fault = Fault(where, "invalid-choice", N_("is not a way to compile"), os.environ.get(where), "programs, plain")

@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sprag.service.cli.console import ExitCode, progress_bar, say, show_table, write_json, wrong_option
-from sprag.service.cli.files import output, read_study, require_cases, to_file
-from sprag.service.cli.options import JsonFlag, OutputFile, PointsFile, SpecFile
-from sprag.service.json_text import to_bytes
-from sprag.service.languages import N_, _
-from sprag.worker.limits import MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
+from sprag_study.service.cli.console import ExitCode, progress_bar, say, show_table, write_json, wrong_option
+from sprag_study.service.cli.files import output, read_study, require_cases, to_file
+from sprag_study.service.cli.options import JsonFlag, OutputFile, PointsFile, SpecFile
+from sprag_study.service.json_text import to_bytes
+from sprag_study.service.languages import N_, _
+from sprag_study.worker.limits import MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from sprag.service.storage.studies.records import RowBlock
-    from sprag.worker.models import ChunkResult, ResultInfo
-    from sprag.worker.study import Study
+    from sprag_study.service.storage.studies.records import RowBlock
+    from sprag_study.worker.models import ChunkResult, ResultInfo
+    from sprag_study.worker.study import Study
 
 #: Cases that are settled together: enough to fill the engine, few enough to show progress.
 _BATCH = 512
@@ -46,9 +46,9 @@ def settle(
     as_json: JsonFlag = False,
 ) -> None:
     """Find the settled motions of cases, with many starts all: regime, order, stability and characteristics."""
-    from sprag.service.exports import Source, csv_pieces, rows_json
-    from sprag.worker.models import OK, study_results
-    from sprag.worker.models.starts import count_of
+    from sprag_study.service.exports import Source, csv_pieces, rows_json
+    from sprag_study.worker.models import OK, study_results
+    from sprag_study.worker.models.starts import count_of
 
     study = _settled(read_study(spec, points).study, at_most)
     cases = _chosen(study, case)
@@ -72,7 +72,7 @@ def settle(
 
 def _settled(study: Study, at_most: int | None) -> Study:
     """The study with settled runs; WrongInputError where its model has no settled motion."""
-    from sprag.worker.models import VIBRATION_DRIVE, settled_study
+    from sprag_study.worker.models import VIBRATION_DRIVE, settled_study
 
     if study.model != VIBRATION_DRIVE:
         message, detail = N_("has no motion that settles"), _("this study cannot be settled")
@@ -92,8 +92,8 @@ def _blocks(study: Study, cases: list[int]) -> list[RowBlock]:
     """The rows of the cases, run here; those of a case with many starts side by side."""
     import numpy as np
 
-    from sprag.worker.models import run_chunk, study_results
-    from sprag.worker.reuse import taken
+    from sprag_study.worker.models import run_chunk, study_results
+    from sprag_study.worker.reuse import taken
 
     if study.sweep is not None:
         return [_of_lines(study, np.array(cases, dtype=np.int64))]
@@ -111,8 +111,8 @@ def _block(infos: tuple[ResultInfo, ...], cases: NDArray[np.int64], done: ChunkR
     """The rows of a run of these cases, in their order: those of a case one after the other."""
     import numpy as np
 
-    from sprag.service.storage.studies.records import RowBlock
-    from sprag.worker.models import OK
+    from sprag_study.service.storage.studies.records import RowBlock
+    from sprag_study.worker.models import OK
 
     if done.further is None:
         return RowBlock(infos, cases, done.endings, done.flags, done.values)
@@ -128,10 +128,10 @@ def _of_lines(study: Study, cases: NDArray[np.int64]) -> RowBlock:
     """The rows of cases of a sweep: whole lines are run, because every case needs those before it."""
     import numpy as np
 
-    from sprag.service.storage.studies.records import RowBlock
-    from sprag.worker.models import run_chunk, study_results
-    from sprag.worker.reuse import taken
-    from sprag.worker.sweeps import LineOrder
+    from sprag_study.service.storage.studies.records import RowBlock
+    from sprag_study.worker.models import run_chunk, study_results
+    from sprag_study.worker.reuse import taken
+    from sprag_study.worker.sweeps import LineOrder
 
     order = LineOrder(study)
     every = np.sort(order.cases(order.lines_at(order.positions(cases))))
@@ -143,9 +143,9 @@ def _of_lines(study: Study, cases: NDArray[np.int64]) -> RowBlock:
 
 def _show(block: RowBlock, starts: int) -> None:
     """One case as a table, without missing values; a column for each of its regimes."""
-    from sprag.service.reading.reader import shown as said
-    from sprag.service.results.regimes import ORDER, coasting_sentence, motion_sentence
-    from sprag.worker.models import ENDING_SENTENCES, OK
+    from sprag_study.service.reading.reader import shown as said
+    from sprag_study.service.results.regimes import ORDER, coasting_sentence, motion_sentence
+    from sprag_study.worker.models import ENDING_SENTENCES, OK
 
     first, *others = block.rows()
     regime, order = (first.results[name] for name in ("regime", ORDER))

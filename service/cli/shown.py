@@ -7,15 +7,15 @@ from collections.abc import Iterator, Mapping
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.cli.console import OK, Column, cell_text, say, show_table, warning_lines, write_text
-from sprag.service.languages import N_, _, decimal
+from sprag_study.service.cli.console import OK, Column, cell_text, say, show_table, warning_lines, write_text
+from sprag_study.service.languages import N_, _, decimal
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from sprag.service.answers import Value
-    from sprag.service.answers.key import AnswerValue
-    from sprag.service.reading.reader import Reading
+    from sprag_study.service.answers import Value
+    from sprag_study.service.answers.key import AnswerValue
+    from sprag_study.service.reading.reader import Reading
 
 #: Indices and the headings of their columns.
 _SHARES = {"first_order": N_("first order"), "first_order_error": "+-", "total": N_("total"), "total_error": "+-"}
@@ -225,7 +225,7 @@ def _share(share: float | None) -> str:
 
 def show_answers(found: dict[str, Any], model: Callable[[], str]) -> None:
     """A table for each curve: its answers and its working point; then the extremes among all cases."""
-    from sprag.service.reading.reader import Reading  # knows the models
+    from sprag_study.service.reading.reader import Reading  # knows the models
 
     reading = Reading(model())
     x = heading(found["x"] or "", found["unit"] or "1")
@@ -253,7 +253,7 @@ def show_answers(found: dict[str, Any], model: Callable[[], str]) -> None:
 
 
 def _answer_row(item: AnswerValue, x_unit: str, reading: Reading) -> tuple[object, ...]:
-    from sprag.service.results.key_answer_words import note_of
+    from sprag_study.service.results.key_answer_words import note_of
 
     unit = "" if item["unit"] == "1" else item["unit"]
     title = reading.caption(item["title"]) if item["title"] == item["result"] else _(item["title"])

@@ -7,14 +7,14 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from sprag.service.cli.console import say, show_table, write_json, wrong_option
-from sprag.service.cli.file_formats import PICTURES, file_format
-from sprag.service.cli.files import to_file, write_pieces
-from sprag.service.cli.names import study_of
-from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, OutputFile, Server, StudyId, Token
-from sprag.service.cli.remote import connection
-from sprag.service.languages import N_, _
-from sprag.service.views.case_questions import CASE_VIEWS
+from sprag_study.service.cli.console import say, show_table, write_json, wrong_option
+from sprag_study.service.cli.file_formats import PICTURES, file_format
+from sprag_study.service.cli.files import to_file, write_pieces
+from sprag_study.service.cli.names import study_of
+from sprag_study.service.cli.options import DEFAULT_SERVER, JsonFlag, OutputFile, Server, StudyId, Token
+from sprag_study.service.cli.remote import connection
+from sprag_study.service.languages import N_, _
+from sprag_study.service.views.case_questions import CASE_VIEWS
 
 #: What a service computes of one case.
 Part = StrEnum("Part", {about.name.upper(): about.name for about in CASE_VIEWS})  # type: ignore[misc]
@@ -42,7 +42,7 @@ def case(
 
     The settings of a motion are the parameters of its address in the HTTP interface.
     """
-    from sprag.service.client.wire import case_path
+    from sprag_study.service.client.wire import case_path
 
     query = [_setting(text) for text in settings or ()]
     if part is None:

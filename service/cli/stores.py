@@ -5,14 +5,14 @@ from __future__ import annotations
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from sprag.service.cli.configured import read_settings
-from sprag.service.cli.console import WrongInputError, say
-from sprag.service.languages import _
+from sprag_study.service.cli.configured import read_settings
+from sprag_study.service.cli.console import WrongInputError, say
+from sprag_study.service.languages import _
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from sprag.service.storage.store import Store
+    from sprag_study.service.storage.store import Store
 
 
 def database_of(db: str | None) -> str:
@@ -20,7 +20,7 @@ def database_of(db: str | None) -> str:
 
     Raises WrongInputError for a file that does not exist.
     """
-    from sprag.service.storage.database.session import file_of
+    from sprag_study.service.storage.database.session import file_of
 
     url = read_settings(database=db).database_url
     file = file_of(url)
@@ -35,7 +35,7 @@ def database_of(db: str | None) -> str:
 
 def store_of(db: str | None) -> Store:
     """The store of that database; raises DatabaseError for an empty one. Close it at the end."""
-    from sprag.service.storage.store import Store
+    from sprag_study.service.storage.store import Store
 
     return Store.open(database_of(db), create=False)
 

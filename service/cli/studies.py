@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from sprag.service.answers.studies import StudyOrder
-from sprag.service.cli import completion
-from sprag.service.cli.console import confirmed, say, show_table, time_text, write_json, wrong_option
-from sprag.service.cli.following import show_study
-from sprag.service.cli.names import study_of
-from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
-from sprag.service.cli.remote import act_on, connection
-from sprag.service.faults import FaultError
-from sprag.service.languages import N_, _
-from sprag.worker.states import StudyState
+from sprag_study.service.answers.studies import StudyOrder
+from sprag_study.service.cli import completion
+from sprag_study.service.cli.console import confirmed, say, show_table, time_text, write_json, wrong_option
+from sprag_study.service.cli.following import show_study
+from sprag_study.service.cli.names import study_of
+from sprag_study.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token
+from sprag_study.service.cli.remote import act_on, connection
+from sprag_study.service.faults import FaultError
+from sprag_study.service.languages import N_, _
+from sprag_study.worker.states import StudyState
 
 if TYPE_CHECKING:
-    from sprag.service.client import Client
+    from sprag_study.service.client import Client
 
 #: Most studies of one request.
 _PAGE: Final = 100
@@ -86,7 +86,7 @@ def edit(
     as_json: JsonFlag = False,
 ) -> None:
     """Change the name, notes and tags of a study, or archive it."""
-    from sprag.service.client.wire import study_path
+    from sprag_study.service.client.wire import study_path
 
     given = {"name": name, "notes": notes, "add_tags": tag, "remove_tags": untag, "archived": archived}
     fields = {field: value for field, value in given.items() if value is not None}
@@ -114,7 +114,7 @@ def delete(
 
     With --at-once, one that is deleted already can be named by its whole id, as `sprag list --deleted` has it.
     """
-    from sprag.service.client.wire import study_path
+    from sprag_study.service.client.wire import study_path
 
     with connection(server, token) as client:
         study = _to_delete(client, study_id, at_once=at_once)
@@ -142,7 +142,7 @@ def delete(
 
 def _to_delete(client: Client, text: str, *, at_once: bool) -> dict[str, Any]:
     """The study that is meant; ``at_once``: also one that is deleted and can be restored, by its whole id."""
-    from sprag.service.client.wire import study_path
+    from sprag_study.service.client.wire import study_path
 
     study_id = study_of(client, text)
     try:

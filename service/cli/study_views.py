@@ -1,7 +1,7 @@
 """``sprag curve``, ``map``, ``answers``, ``explore`` and their like: the views of a study, run here or of a service.
 
-Their options are the settings of the views (`sprag.service.views.study_questions`); nothing else is loaded before one
-runs.
+Their options are the settings of the views (`sprag_study.service.views.study_questions`); nothing else is loaded before
+one runs.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from inspect import Signature
 from typing import TYPE_CHECKING, Any, Final, cast
 
-from sprag.service import languages
-from sprag.service.cli.case_views import (
+from sprag_study.service import languages
+from sprag_study.service.cli.case_views import (
     SpecOrStudy,
     is_study,
     naming_options,
@@ -24,12 +24,12 @@ from sprag.service.cli.case_views import (
     require_language,
     say_file,
 )
-from sprag.service.cli.configured import read_settings
-from sprag.service.cli.console import say, warning_lines, write_json, wrong_option
-from sprag.service.cli.file_formats import PICTURES, file_format
-from sprag.service.cli.files import read_study, write_pieces
-from sprag.service.cli.names import study_of
-from sprag.service.cli.options import (
+from sprag_study.service.cli.configured import read_settings
+from sprag_study.service.cli.console import say, warning_lines, write_json, wrong_option
+from sprag_study.service.cli.file_formats import PICTURES, file_format
+from sprag_study.service.cli.files import read_study, write_pieces
+from sprag_study.service.cli.names import study_of
+from sprag_study.service.cli.options import (
     DEFAULT_SERVER,
     FileUnits,
     JsonFlag,
@@ -40,9 +40,9 @@ from sprag.service.cli.options import (
     in_language,
     in_units,
 )
-from sprag.service.cli.remote import connection
-from sprag.service.cli.running import run_parsed
-from sprag.service.cli.shown import (
+from sprag_study.service.cli.remote import connection
+from sprag_study.service.cli.running import run_parsed
+from sprag_study.service.cli.shown import (
     show_answers,
     show_calibration,
     show_cases,
@@ -53,13 +53,13 @@ from sprag.service.cli.shown import (
     show_sensitivity,
     show_yield,
 )
-from sprag.service.languages import N_, _
-from sprag.service.reading.numbers import probability_of
-from sprag.service.views import study_questions as questions
-from sprag.service.views.setting import settings_of
+from sprag_study.service.languages import N_, _
+from sprag_study.service.reading.numbers import probability_of
+from sprag_study.service.views import study_questions as questions
+from sprag_study.service.views.setting import settings_of
 
 if TYPE_CHECKING:
-    from sprag.service.views.setting import NamedSetting, ViewInfo
+    from sprag_study.service.views.setting import NamedSetting, ViewInfo
 
 #: Formats of their files.
 _FORMATS: Final = ("csv", *PICTURES)
@@ -169,7 +169,7 @@ def _remote(
     text: str, server: str, token: str | None, about: ViewInfo, asked: tuple[NamedSetting, ...], drawing: dict[str, str]
 ) -> Iterator[_Source]:
     """The view of a study of a running service."""
-    from sprag.service.client.wire import study_path
+    from sprag_study.service.client.wire import study_path
 
     with connection(server, token) as client:
         path = study_path(study_of(client, text))
@@ -191,11 +191,11 @@ def _local(
     path: str, about: ViewInfo, asked: tuple[NamedSetting, ...], first: dict[str, Any], drawing: dict[str, str]
 ) -> Iterator[_Source]:
     """The view of the study of a spec, which is run here first."""
-    from sprag.service.reading.quantities import SI
-    from sprag.service.reading.reader import CAPTIONS, Choice, reading_for
-    from sprag.service.views.library import Library
-    from sprag.service.views.studies import STUDY_VIEWS
-    from sprag.service.views.study_view import StudyAnswer, found, is_drawn, written
+    from sprag_study.service.reading.quantities import SI
+    from sprag_study.service.reading.reader import CAPTIONS, Choice, reading_for
+    from sprag_study.service.views.library import Library
+    from sprag_study.service.views.studies import STUDY_VIEWS
+    from sprag_study.service.views.study_view import StudyAnswer, found, is_drawn, written
 
     parsed = read_study(path)
     say(*warning_lines(parsed.warnings))

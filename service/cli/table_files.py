@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from sprag.service.cli.console import WrongInputError, wrong_option
-from sprag.service.languages import N_, _
+from sprag_study.service.cli.console import WrongInputError, wrong_option
+from sprag_study.service.languages import N_, _
 
 #: What has a table, and what else in it stays when a file takes the place of its table, its formula or its links. The
 #: names are not imported: a command for a running service does without the models.

@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from sprag.service.cli import completion
-from sprag.service.cli.console import WrongInputError, say, show_table, write_json, wrong_option
-from sprag.service.cli.groups import Groups
-from sprag.service.cli.names import token_of, user_of
-from sprag.service.cli.options import Database, JsonFlag
-from sprag.service.cli.user import users_of
-from sprag.service.languages import N_, _
-from sprag.service.storage.people.scopes import TokenScope, TokenState
-from sprag.worker.limits import MAX_NAME_LENGTH
+from sprag_study.service.cli import completion
+from sprag_study.service.cli.console import WrongInputError, say, show_table, write_json, wrong_option
+from sprag_study.service.cli.groups import Groups
+from sprag_study.service.cli.names import token_of, user_of
+from sprag_study.service.cli.options import Database, JsonFlag
+from sprag_study.service.cli.user import users_of
+from sprag_study.service.languages import N_, _
+from sprag_study.service.storage.people.scopes import TokenScope, TokenState
+from sprag_study.worker.limits import MAX_NAME_LENGTH
 
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from sprag.service.storage.people.people import TokenRecord
+    from sprag_study.service.storage.people.people import TokenRecord
 
 _STATES: Final = {
     TokenState.VALID: N_("valid"),
@@ -122,7 +122,7 @@ def revoke(
     as_json: JsonFlag = False,
 ) -> None:
     """Revoke a token and end the browser sessions that it started, within two seconds."""
-    from sprag.service.storage.errors import TokenNotFoundError
+    from sprag_study.service.storage.errors import TokenNotFoundError
 
     with users_of(db, as_json) as store:
         try:

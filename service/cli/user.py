@@ -7,21 +7,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sprag.service.actor import Role
-from sprag.service.cli import completion
-from sprag.service.cli.console import WrongInputError, say, show_table, time_text, write_json, wrong_option
-from sprag.service.cli.groups import Groups
-from sprag.service.cli.names import user_of
-from sprag.service.cli.options import Database, JsonFlag
-from sprag.service.cli.stores import named_store
-from sprag.service.languages import N_, _
-from sprag.service.storage.people.scopes import MAX_USER_NAME
+from sprag_study.service.actor import Role
+from sprag_study.service.cli import completion
+from sprag_study.service.cli.console import WrongInputError, say, show_table, time_text, write_json, wrong_option
+from sprag_study.service.cli.groups import Groups
+from sprag_study.service.cli.names import user_of
+from sprag_study.service.cli.options import Database, JsonFlag
+from sprag_study.service.cli.stores import named_store
+from sprag_study.service.languages import N_, _
+from sprag_study.service.storage.people.scopes import MAX_USER_NAME
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from sprag.service.storage.people.people import Quota, UserRecord
-    from sprag.service.storage.store import Store
+    from sprag_study.service.storage.people.people import Quota, UserRecord
+    from sprag_study.service.storage.store import Store
 
 app = typer.Typer(
     help="Add, list, change and remove users.",
@@ -179,7 +179,7 @@ def hand_over(
 @contextmanager
 def users_of(db: str | None, as_json: bool) -> Iterator[Store]:
     """The store of a database; an unknown user, or one who exists already, is wrong input."""
-    from sprag.service.storage.errors import UserExistsError, UserNotFoundError
+    from sprag_study.service.storage.errors import UserExistsError, UserNotFoundError
 
     with named_store(db, quiet=as_json) as store:
         try:
@@ -191,7 +191,7 @@ def users_of(db: str | None, as_json: bool) -> Iterator[Store]:
 
 
 def _quota(cases: int | None, storage: int | None, checks: int | None) -> Quota:
-    from sprag.service.storage.people.people import Quota
+    from sprag_study.service.storage.people.people import Quota
 
     return Quota(cases, None if storage is None else storage * 2**20, checks)
 
@@ -204,7 +204,7 @@ def _show(store: Store, record: UserRecord, as_json: bool, sentence: str) -> Non
 
 
 def _json(record: UserRecord) -> dict[str, Any]:
-    from sprag.service.json_text import timestamp
+    from sprag_study.service.json_text import timestamp
 
     return {
         "name": record.name,

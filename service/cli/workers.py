@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag.service.cli.console import Column, say, show_table, time_text, write_json
-from sprag.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, Token
-from sprag.service.cli.remote import connection
-from sprag.service.languages import _
+from sprag_study.service.cli.console import Column, say, show_table, time_text, write_json
+from sprag_study.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, Token
+from sprag_study.service.cli.remote import connection
+from sprag_study.service.languages import _
 
 if TYPE_CHECKING:
-    from sprag.service.answers.workers import Dispatcher
+    from sprag_study.service.answers.workers import Dispatcher
 
 
 def workers(server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False) -> None:

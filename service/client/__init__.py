@@ -1,6 +1,6 @@
 """The Python client of the service.
 
-    from sprag.service.client import Client
+    from sprag_study.service.client import Client
 
     with Client() as sprag:
         study = sprag.submit("study.json").wait()
@@ -11,10 +11,10 @@
 `RefusedError` carries the service's problem document. pandas, polars and xarray are loaded only when they are used.
 """
 
-from sprag.service.client.asynchronous.client import AsyncClient
-from sprag.service.client.asynchronous.study import AsyncStudy
-from sprag.service.client.comparison import Comparison
-from sprag.service.client.errors import (
+from sprag_study.service.client.asynchronous.client import AsyncClient
+from sprag_study.service.client.asynchronous.study import AsyncStudy
+from sprag_study.service.client.comparison import Comparison
+from sprag_study.service.client.errors import (
     AmbiguousError,
     ArgumentError,
     RefusedError,
@@ -24,15 +24,15 @@ from sprag.service.client.errors import (
     UnreachableError,
     UntrustedError,
 )
-from sprag.service.client.events import StudyEvent
-from sprag.service.client.frames import Curves
-from sprag.service.client.motions import Engagements, Motion
-from sprag.service.client.queries import preset
-from sprag.service.client.synchronous.client import Client
-from sprag.service.client.synchronous.comparing import compare
-from sprag.service.client.synchronous.study import Study
-from sprag.service.client.tabular import with_units
-from sprag.service.client.wire import Query
+from sprag_study.service.client.events import StudyEvent
+from sprag_study.service.client.frames import Curves
+from sprag_study.service.client.motions import Engagements, Motion
+from sprag_study.service.client.queries import preset
+from sprag_study.service.client.synchronous.client import Client
+from sprag_study.service.client.synchronous.comparing import compare
+from sprag_study.service.client.synchronous.study import Study
+from sprag_study.service.client.tabular import with_units
+from sprag_study.service.client.wire import Query
 
 __all__ = [
     "AmbiguousError",

@@ -9,7 +9,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
-    from sprag.service.answers.studies import StudyDetail
+    from sprag_study.service.answers.studies import StudyDetail
 
 
 class Progressing(Protocol):

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.extras import naming_extra
+from sprag_study.service.extras import naming_extra
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import pandas as pd
 
-    from sprag.service.answers.tolerances import CausesInfo, RibbonReport, YieldReport
+    from sprag_study.service.answers.tolerances import CausesInfo, RibbonReport, YieldReport
 
 
 @dataclass(frozen=True, slots=True, repr=False)

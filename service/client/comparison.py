@@ -6,17 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.answers.differing import differing, unique_names
-from sprag.service.client.tabular import Tabular
-from sprag.service.extras import naming_extra
+from sprag_study.service.answers.differing import differing, unique_names
+from sprag_study.service.client.tabular import Tabular
+from sprag_study.service.extras import naming_extra
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from sprag.service.answers.studies import StudyDetail
-    from sprag.service.client.frames import Curves
-    from sprag.service.client.queries import Held
-    from sprag.service.client.sketch import Line
+    from sprag_study.service.answers.studies import StudyDetail
+    from sprag_study.service.client.frames import Curves
+    from sprag_study.service.client.queries import Held
+    from sprag_study.service.client.sketch import Line
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, cast, get_args
 
-from sprag.sentences import sentence_of
-from sprag.service.faults import Code, Fault, FaultError, Kind, ParameterFault, shown
+from sprag_study.sentences import sentence_of
+from sprag_study.service.faults import Code, Fault, FaultError, Kind, ParameterFault, shown
 
 
 class ServiceError(FaultError):

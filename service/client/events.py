@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, cast
 
 if TYPE_CHECKING:
-    from sprag.service.answers.studies import FullProgress
+    from sprag_study.service.answers.studies import FullProgress
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,10 +6,10 @@ import io
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.client.tabular import Tabular
-from sprag.service.extras import naming_extra
-from sprag.service.formats import NAME_ATTRIBUTE
-from sprag.worker.codes import ENDING_CODES, PENDING, REGIME_CODES
+from sprag_study.service.client.tabular import Tabular
+from sprag_study.service.extras import naming_extra
+from sprag_study.service.formats import NAME_ATTRIBUTE
+from sprag_study.worker.codes import ENDING_CODES, PENDING, REGIME_CODES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     import polars as pl
     import xarray as xr
 
-    from sprag.service.answers.results import CaseDetail, CurvesData
-    from sprag.service.client.sketch import Line
+    from sprag_study.service.answers.results import CaseDetail, CurvesData
+    from sprag_study.service.client.sketch import Line
 
 
 @dataclass(frozen=True, slots=True)

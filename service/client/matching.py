@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from sprag.service.client.errors import AmbiguousError
+from sprag_study.service.client.errors import AmbiguousError
 
 
 class Named(NamedTuple):

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, cast
 
-from sprag.service.client.tabular import Tabular
-from sprag.service.extras import naming_extra
+from sprag_study.service.client.tabular import Tabular
+from sprag_study.service.extras import naming_extra
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from sprag.service.answers.results import AngleTable, EngagementTables, Trajectory
-    from sprag.service.client.sketch import Line
+    from sprag_study.service.answers.results import AngleTable, EngagementTables, Trajectory
+    from sprag_study.service.client.sketch import Line
 
 #: SI units of the columns of engagements and of periods.
 _ENGAGEMENT_UNITS: Final = {"start": "s", "end": "s", "torque_max": "N*m", "work_shaft": "J", "work_pendulum": "J"}

@@ -10,9 +10,9 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from sprag.service.client.errors import ArgumentError, SpecFileError
-from sprag.service.plain_data import plain
-from sprag.service.presets import preset_names, preset_text
+from sprag_study.service.client.errors import ArgumentError, SpecFileError
+from sprag_study.service.plain_data import plain
+from sprag_study.service.presets import preset_names, preset_text
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -121,7 +121,7 @@ def finish_text(when: str | datetime) -> str:
 
 def form_of(path: Path) -> str:
     """The format by the ending of a file's name; ValueError for an unknown ending."""
-    from sprag.service.formats import format_of
+    from sprag_study.service.formats import format_of
 
     form = format_of(path.name)
     if form is None:

@@ -6,12 +6,12 @@ from contextlib import suppress
 from html import escape
 from typing import TYPE_CHECKING, Any, Protocol
 
-from sprag.service.client.bars import bar_html
-from sprag.service.client.errors import RefusedError, ServiceError
+from sprag_study.service.client.bars import bar_html
+from sprag_study.service.client.errors import RefusedError, ServiceError
 
 if TYPE_CHECKING:
-    from sprag.service.answers.studies import StudyDetail
-    from sprag.service.client.frames import Curves
+    from sprag_study.service.answers.studies import StudyDetail
+    from sprag_study.service.client.frames import Curves
 
 
 class AsyncShown:

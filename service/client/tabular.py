@@ -6,8 +6,8 @@ from abc import ABC, abstractmethod
 from html import escape
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.client.sketch import Line, sketch
-from sprag.service.extras import naming_extra
+from sprag_study.service.client.sketch import Line, sketch
+from sprag_study.service.extras import naming_extra
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,11 +12,11 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from sprag.service.client.errors import RefusedError, ServiceError, StudyTimeoutError, UnreachableError
-from sprag.service.client.wire import SILENCE
-from sprag.worker.states import TERMINAL
+from sprag_study.service.client.errors import RefusedError, ServiceError, StudyTimeoutError, UnreachableError
+from sprag_study.service.client.wire import SILENCE
+from sprag_study.worker.states import TERMINAL
 
-_LOG = logging.getLogger(__name__)
+_LOG = logging.getLogger("sprag.client")
 
 ENDED: Final = frozenset(state.value for state in TERMINAL)
 #: Seconds between two polls of a study: short at first, then longer, up to the last.

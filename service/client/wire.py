@@ -15,9 +15,15 @@ from urllib.parse import quote
 
 import httpx
 
-from sprag.service.client.errors import ArgumentError, RefusedError, ServiceError, UnreachableError, UntrustedError
-from sprag.service.languages import N_
-from sprag.service.plain_data import plain
+from sprag_study.service.client.errors import (
+    ArgumentError,
+    RefusedError,
+    ServiceError,
+    UnreachableError,
+    UntrustedError,
+)
+from sprag_study.service.languages import N_
+from sprag_study.service.plain_data import plain
 
 #: Seconds without a byte after which an event stream is abandoned; the service sends one every 15 s.
 SILENCE: Final = 30.0

@@ -12,9 +12,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Final
 
-from sprag.service.exports.source import MissingRowsError, Source, StoredRows, stored
-from sprag.service.exports.spool import room_required
-from sprag.service.exports.text import (
+from sprag_study.service.exports.source import MissingRowsError, Source, StoredRows, stored
+from sprag_study.service.exports.spool import room_required
+from sprag_study.service.exports.text import (
     csv_pieces,
     json_pieces,
     read_table,
@@ -22,7 +22,7 @@ from sprag.service.exports.text import (
     rows_json,
     table_csv,
 )
-from sprag.service.formats import Format
+from sprag_study.service.formats import Format
 
 __all__ = [
     "MissingRowsError",

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import pyarrow as pa
 
-from sprag.service.exports.inputs import column_description
-from sprag.service.exports.source import machine
-from sprag.worker.directions import SWEEP
+from sprag_study.service.exports.inputs import column_description
+from sprag_study.service.exports.source import machine
+from sprag_study.worker.directions import SWEEP
 
 if TYPE_CHECKING:
-    from sprag.service.exports.source import Source
-    from sprag.service.storage.studies.records import RowBlock
+    from sprag_study.service.exports.source import Source
+    from sprag_study.service.storage.studies.records import RowBlock
 
 #: Rows of one group of a Parquet file: about 20 MB of numbers.
 _GROUP_ROWS: Final = 50_000

@@ -5,16 +5,16 @@ from __future__ import annotations
 from itertools import islice
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from sprag.service.answers import filled
-from sprag.service.answers.people import AuditEntry
-from sprag.service.exports.text import csv_lines
-from sprag.service.json_text import to_bytes
-from sprag.service.spec.csv_text import escape
+from sprag_study.service.answers import filled
+from sprag_study.service.answers.people import AuditEntry
+from sprag_study.service.exports.text import csv_lines
+from sprag_study.service.json_text import to_bytes
+from sprag_study.service.spec.csv_text import escape
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from sprag.service.storage.people.audit import AuditRecord
+    from sprag_study.service.storage.people.audit import AuditRecord
 
 AuditFormat = Literal["json", "csv", "jsonl"]
 #: Formats of the log; `json` is a page of it.

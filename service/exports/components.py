@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final, Literal
 
-from sprag.service.exports.text import csv_lines
-from sprag.service.spec.components import COLUMNS, KINDS, Component, fields_of
-from sprag.service.spec.csv_text import escape
+from sprag_study.service.exports.text import csv_lines
+from sprag_study.service.spec.components import COLUMNS, KINDS, Component, fields_of
+from sprag_study.service.spec.csv_text import escape
 
 ComponentFormat = Literal["json", "csv"]
 COMPONENT_FORMATS: Final[dict[ComponentFormat, str]] = {"json": "application/json", "csv": "text/csv; charset=utf-8"}

@@ -9,16 +9,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-from sprag.service.languages import N_
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.spec.derive import formulas_of
-from sprag.service.spec.machine.registry import part_of
-from sprag.worker.directions import SWEEP
-from sprag.worker.models.parameters import parameter_of
-from sprag.worker.spread import DRIVE
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.spec.derive import formulas_of
+from sprag_study.service.spec.machine.registry import part_of
+from sprag_study.worker.directions import SWEEP
+from sprag_study.worker.models.parameters import parameter_of
+from sprag_study.worker.spread import DRIVE
 
 if TYPE_CHECKING:
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
 #: Origin of the value of an input; "" where the user's spec is unknown.
 Origin = Literal["given", "default", "fitted", "axes", "derived", "tolerance", ""]

@@ -12,21 +12,21 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.service.exports.inputs import column_description, description_of
-from sprag.service.exports.source import machine
-from sprag.service.exports.spool import require_room, spooled
-from sprag.service.formats import NAME_ATTRIBUTE
-from sprag.service.reading.catalogue import unit_of
-from sprag.worker.codes import ENDING_CODES, FLAG_MASKS, PENDING, flags_mask
-from sprag.worker.derived import blocks
-from sprag.worker.directions import DIRECTIONS, DOWN, SWEEP, UP
+from sprag_study.service.exports.inputs import column_description, description_of
+from sprag_study.service.exports.source import machine
+from sprag_study.service.exports.spool import require_room, spooled
+from sprag_study.service.formats import NAME_ATTRIBUTE
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.worker.codes import ENDING_CODES, FLAG_MASKS, PENDING, flags_mask
+from sprag_study.worker.derived import blocks
+from sprag_study.worker.directions import DIRECTIONS, DOWN, SWEEP, UP
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.exports.source import Source
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.study import Axis, Study
+    from sprag_study.service.exports.source import Source
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.study import Axis, Study
 
 _CONVENTIONS: Final = "CF-1.11"
 _CASE: Final = "case"
@@ -161,7 +161,7 @@ def _about(source: Source) -> dict[str, Any]:
     return {
         "Conventions": _CONVENTIONS,
         "title": study.name or "parameter study",
-        "history": f"written by Sprag {version('sprag')}",
+        "history": f"written by Sprag {version('sprag-study')}",
         **{name: part if isinstance(part, str) else json.dumps(part) for name, part in source.about.items()},
         **{name: part if isinstance(part, str) else json.dumps(part) for name, part in machine(source).items()},
     }

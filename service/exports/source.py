@@ -9,22 +9,22 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.service.exports.inputs import choices, defaults
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.directions import value_columns
-from sprag.service.reading.quantities import SI, Units, units_for
-from sprag.service.spec.kinds.tolerances import SPREAD
-from sprag.worker import models
-from sprag.worker.ports import StoreError
+from sprag_study.service.exports.inputs import choices, defaults
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.directions import value_columns
+from sprag_study.service.reading.quantities import SI, Units, units_for
+from sprag_study.service.spec.kinds.tolerances import SPREAD
+from sprag_study.worker import models
+from sprag_study.worker.ports import StoreError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.formats import Header
-    from sprag.service.storage.store import Store
-    from sprag.service.storage.studies.records import RowBlock, StudyRecord
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.study import Study
+    from sprag_study.service.formats import Header
+    from sprag_study.service.storage.store import Store
+    from sprag_study.service.storage.studies.records import RowBlock, StudyRecord
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.study import Study
 
 
 #: Parts of a spec that describe the machine and its run; the rows themselves contain the axes.

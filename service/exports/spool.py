@@ -12,8 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
-from sprag.service.faults import FaultError
-from sprag.service.stale_files import marked, sweep
+from sprag_study.service.faults import FaultError
+from sprag_study.service.stale_files import marked, sweep
 
 _PREFIX: Final = "sprag-export-"
 _PIECE: Final = 1 << 20

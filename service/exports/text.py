@@ -7,19 +7,19 @@ import io
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.exports.source import machine
-from sprag.service.json_text import to_bytes
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.directions import value_columns
-from sprag.service.spec.csv_text import escape
+from sprag_study.service.exports.source import machine
+from sprag_study.service.json_text import to_bytes
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.directions import value_columns
+from sprag_study.service.spec.csv_text import escape
 
 if TYPE_CHECKING:
-    from sprag.service.answers import Value
-    from sprag.service.answers.results import Case
-    from sprag.service.exports.source import Source
-    from sprag.service.reading.quantities import Units
-    from sprag.service.storage.studies.records import CaseRow, RowBlock
-    from sprag.worker.study import Study
+    from sprag_study.service.answers import Value
+    from sprag_study.service.answers.results import Case
+    from sprag_study.service.exports.source import Source
+    from sprag_study.service.reading.quantities import Units
+    from sprag_study.service.storage.studies.records import CaseRow, RowBlock
+    from sprag_study.worker.study import Study
 
 #: Spreadsheets interpret cells that begin with these characters as formulas.
 

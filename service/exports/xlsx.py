@@ -13,13 +13,13 @@ import xlsxwriter
 from xlsxwriter.utility import xl_range
 from xlsxwriter.worksheet import Worksheet
 
-from sprag.service.exports.inputs import inputs, run_inputs
-from sprag.service.exports.source import given_texts
-from sprag.service.exports.spool import spooled
+from sprag_study.service.exports.inputs import inputs, run_inputs
+from sprag_study.service.exports.source import given_texts
+from sprag_study.service.exports.spool import spooled
 
 if TYPE_CHECKING:
-    from sprag.service.exports.source import Source
-    from sprag.service.storage.studies.records import RowBlock
+    from sprag_study.service.exports.source import Source
+    from sprag_study.service.storage.studies.records import RowBlock
 
 #: Rows of a sheet, including those of units and names; further cases continue on another sheet.
 SHEET_ROWS: Final = 1_048_576

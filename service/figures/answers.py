@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from sprag.sentences import Amount
-from sprag.service.figures.curves import curves_figure
-from sprag.service.figures.figure import Figure, Note, NoteKind, Panel
-from sprag.service.reading.reader import Phrase
+from sprag_study.sentences import Amount
+from sprag_study.service.figures.curves import curves_figure
+from sprag_study.service.figures.figure import Figure, Note, NoteKind, Panel
+from sprag_study.service.reading.reader import Phrase
 
 if TYPE_CHECKING:
-    from sprag.service.results.key_answers import Found, StudyAnswers
+    from sprag_study.service.results.key_answers import Found, StudyAnswers
 
 
 def answers_figure(found: StudyAnswers, columns: int = 1, *, chosen: int | None = None) -> Figure:

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.sentences import Amount
-from sprag.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
-from sprag.service.reading.reader import Phrase, joined, plural
-from sprag.service.reading.wording import number
+from sprag_study.sentences import Amount
+from sprag_study.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
+from sprag_study.service.reading.reader import Phrase, joined, plural
+from sprag_study.service.reading.wording import number
 
 if TYPE_CHECKING:
-    from sprag.worker.models import Basin
+    from sprag_study.worker.models import Basin
 
 #: Colour of starts that did not end ok.
 _FAILED = "#999999"

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import Amount
-from sprag.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.reader import Phrase, joined, plural, term
-from sprag.service.results.selection import axis_name
+from sprag_study.sentences import Amount
+from sprag_study.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.reader import Phrase, joined, plural, term
+from sprag_study.service.results.selection import axis_name
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.worker.models.branches import Along, CaseBranch, SpecialPoint
-    from sprag.worker.study import Study
+    from sprag_study.worker.models.branches import Along, CaseBranch, SpecialPoint
+    from sprag_study.worker.study import Study
 
 #: Colours of stable and unstable parts, and of each kind of special point.
 _STABLE, _UNSTABLE, _OWN = PALETTE[0], PALETTE[1], "#777777"

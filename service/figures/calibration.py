@@ -6,18 +6,18 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.figures.figure import Figure, Line, Panel, Quantity, line_colours
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.reader import Phrase, joined
-from sprag.service.reading.wording import number
-from sprag.worker.planning.calibrate.candidates import along, groups
+from sprag_study.service.figures.figure import Figure, Line, Panel, Quantity, line_colours
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.reader import Phrase, joined
+from sprag_study.service.reading.wording import number
+from sprag_study.worker.planning.calibrate.candidates import along, groups
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
-    from sprag.service.results.calibration import Calibration
+    from sprag_study.service.results.calibration import Calibration
 
 _NOTHING: Final = Phrase("The first fit has not ended yet.")
 #: Dashes of a fitted curve, and of the ends of its intervals.

@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
-from sprag.service.reading.reader import Phrase
-from sprag.service.reading.units import QuantityError, parse_quantity
-from sprag.worker import models
+from sprag_study.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
+from sprag_study.service.reading.reader import Phrase
+from sprag_study.service.reading.units import QuantityError, parse_quantity
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
 _POINTS: Final = 160
 _WINDUP, _TORQUE = Quantity(Phrase("windup"), "rad"), Quantity(Phrase("torque of the clutch"), "N*m")

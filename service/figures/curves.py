@@ -7,23 +7,23 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import Amount, Name
-from sprag.service.figures.figure import Band, Figure, Line, Marks, Panel, Quantity, line_colours
-from sprag.service.figures.orders import TITLE, order_map, strip_of
-from sprag.service.reading.reader import Phrase, joined, term
-from sprag.service.results.joined import joined_points
-from sprag.service.results.refined import jumps_of, sentence
-from sprag.service.results.regimes import DOUBTFUL, MARKED, UNSETTLED, regimes_of
-from sprag.service.results.sweeps import hysteresis, values_text, without_direction
-from sprag.worker.codes import PENDING
-from sprag.worker.directions import SWEEP
-from sprag.worker.models import Ending, WorkerEnding
+from sprag_study.sentences import Amount, Name
+from sprag_study.service.figures.figure import Band, Figure, Line, Marks, Panel, Quantity, line_colours
+from sprag_study.service.figures.orders import TITLE, order_map, strip_of
+from sprag_study.service.reading.reader import Phrase, joined, term
+from sprag_study.service.results.joined import joined_points
+from sprag_study.service.results.refined import jumps_of, sentence
+from sprag_study.service.results.regimes import DOUBTFUL, MARKED, UNSETTLED, regimes_of
+from sprag_study.service.results.sweeps import hysteresis, values_text, without_direction
+from sprag_study.worker.codes import PENDING
+from sprag_study.worker.directions import SWEEP
+from sprag_study.worker.models import Ending, WorkerEnding
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.results.curves import Curve, Curves, Map
-    from sprag.worker.models import ResultInfo
+    from sprag_study.service.results.curves import Curve, Curves, Map
+    from sprag_study.worker.models import ResultInfo
 
 #: Most points of all lines of a panel together, and the least and the most of one line: five per column of pixels of a
 #: wide picture.

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from html import escape
 from typing import TYPE_CHECKING, Final, Literal
 
-from sprag.service.figures.painter.elements import text_width
-from sprag.service.reading.wording import symbol
+from sprag_study.service.figures.painter.elements import text_width
+from sprag_study.service.reading.wording import symbol
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

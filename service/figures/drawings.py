@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.figures.drive_drawing import drive_drawings
-from sprag.service.figures.linkage import machine_drawings
-from sprag.worker import models
-from sprag.worker.models import machine_shaft
-from sprag.worker.models.parameters import model_parameter
+from sprag_study.service.figures.drive_drawing import drive_drawings
+from sprag_study.service.figures.linkage import machine_drawings
+from sprag_study.worker import models
+from sprag_study.worker.models import machine_shaft
+from sprag_study.worker.models.parameters import model_parameter
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from sprag.service.figures.drawing import Drawing
-    from sprag.worker.study import Study
+    from sprag_study.service.figures.drawing import Drawing
+    from sprag_study.worker.study import Study
 
 #: Angle of the shaft in the drawing of a mechanism, in degrees.
 USUAL_ANGLE: Final = 60.0

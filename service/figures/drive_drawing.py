@@ -9,8 +9,8 @@ import math
 import re
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.figures.drawing import Dimension, Drawing
-from sprag.service.languages import gettext
+from sprag_study.service.figures.drawing import Dimension, Drawing
+from sprag_study.service.languages import gettext
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
-from sprag.service.reading.reader import Phrase
-from sprag.service.results.sensitivity import in_order
+from sprag_study.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
+from sprag_study.service.reading.reader import Phrase
+from sprag_study.service.results.sensitivity import in_order
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.results.sensitivity import Sensitivity
+    from sprag_study.service.results.sensitivity import Sensitivity
 
 
 def effects_figure(found: Sequence[Sensitivity], columns: int = 2) -> Figure:

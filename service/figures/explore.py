@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.faults import refused
-from sprag.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
-from sprag.service.reading.reader import Phrase, plural
-from sprag.service.results.selection import listed
+from sprag_study.service.faults import refused
+from sprag_study.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
+from sprag_study.service.reading.reader import Phrase, plural
+from sprag_study.service.results.selection import listed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.results.explore import Explored
+    from sprag_study.service.results.explore import Explored
 
 _OTHERS: Final = "#b0b8c4"
 #: Most points of a kind in a picture.

@@ -9,8 +9,8 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.service.languages import gettext
-from sprag.service.reading.reader import Phrase
+from sprag_study.service.languages import gettext
+from sprag_study.service.reading.reader import Phrase
 
 #: Colours of lines on white paper, with a contrast of at least 4.5 : 1; pages have others on dark ground. Markers,
 #: dashes and names repeat what they tell apart.

@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import Name
-from sprag.service.faults import refused
-from sprag.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.reader import Phrase, plural
-from sprag.service.results.fronts import history, worst_of
+from sprag_study.sentences import Name
+from sprag_study.service.faults import refused
+from sprag_study.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.reader import Phrase, plural
+from sprag_study.service.results.fronts import history, worst_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.results.fronts import Designs
+    from sprag_study.service.results.fronts import Designs
 
 #: The number of a design, as an axis.
 NUMBER: Final = "design"

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.service.figures.drawing import Dimension, Drawing
-from sprag.service.languages import N_, gettext
-from sprag.service.reading.reader import titled
-from sprag.worker.models import machine_shaft
+from sprag_study.service.figures.drawing import Dimension, Drawing
+from sprag_study.service.languages import N_, gettext
+from sprag_study.service.reading.reader import titled
+from sprag_study.worker.models import machine_shaft
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

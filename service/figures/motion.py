@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.figures.figure import NEUTRAL, PALETTE, Figure, Line, Panel, Quantity
-from sprag.service.reading.reader import Phrase, joined, part_label
-from sprag.service.reading.wording import words
+from sprag_study.service.figures.figure import NEUTRAL, PALETTE, Figure, Line, Panel, Quantity
+from sprag_study.service.reading.reader import Phrase, joined, part_label
+from sprag_study.service.reading.wording import words
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.worker.models import Panel as Described
-    from sprag.worker.models import Presentation, Reference, Trajectory
+    from sprag_study.worker.models import Panel as Described
+    from sprag_study.worker.models import Presentation, Reference, Trajectory
 
 #: Points of a line that are drawn.
 _MOST_POINTS: Final = 2400

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.reading.reader import Phrase, plural, shown, term
-from sprag.service.results.regimes import MARKS, ORDER
-from sprag.service.results.sweeps import values_text
+from sprag_study.service.reading.reader import Phrase, plural, shown, term
+from sprag_study.service.results.regimes import MARKS, ORDER
+from sprag_study.service.results.sweeps import values_text
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.results.curves import Curve, Map
+    from sprag_study.service.results.curves import Curve, Map
 
 Look = tuple[str, str]
 Span = tuple[str, float, float]

@@ -6,22 +6,22 @@ import re
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final, Literal, cast, get_args
 
-from sprag.sentences import Sentence
-from sprag.service.faults import refused
-from sprag.service.figures.curves import curves_figure
-from sprag.service.figures.read import read_figure
-from sprag.service.figures.svg import WIDE, as_file, picture_svg
-from sprag.service.figures.svg_bars import sensitivity_svg
-from sprag.service.figures.svg_map import picture_map
-from sprag.worker.pool.child_process import uncounted
+from sprag_study.sentences import Sentence
+from sprag_study.service.faults import refused
+from sprag_study.service.figures.curves import curves_figure
+from sprag_study.service.figures.read import read_figure
+from sprag_study.service.figures.svg import WIDE, as_file, picture_svg
+from sprag_study.service.figures.svg_bars import sensitivity_svg
+from sprag_study.service.figures.svg_map import picture_map
+from sprag_study.worker.pool.child_process import uncounted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.figures.figure import Figure
-    from sprag.service.reading.reader import Reading
-    from sprag.service.results.curves import Curves, Map
-    from sprag.service.results.sensitivity import Sensitivity
+    from sprag_study.service.figures.figure import Figure
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.service.results.curves import Curves, Map
+    from sprag_study.service.results.sensitivity import Sensitivity
 
 Picture = Literal["svg", "png", "pdf"]
 PICTURES: Final[tuple[Picture, ...]] = get_args(Picture)

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
-from sprag.service.reading.reader import Phrase, part_label, plural, term
-from sprag.worker import models
+from sprag_study.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
+from sprag_study.service.reading.reader import Phrase, part_label, plural, term
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.worker.models import Portrait, Presentation, Trajectory
+    from sprag_study.worker.models import Portrait, Presentation, Trajectory
 
 #: Approximate number of points of all orbits of a figure together.
 _MOST_POINTS: Final = 12_000

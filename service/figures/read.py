@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from sprag.service.figures.figure import Quantity
+from sprag_study.service.figures.figure import Quantity
 
 if TYPE_CHECKING:
-    from sprag.service.figures.figure import Band, Figure, Fill, Line, Marks, Note, Panel
-    from sprag.service.reading.reader import Reading
-    from sprag.service.results.curves import Map
+    from sprag_study.service.figures.figure import Band, Figure, Fill, Line, Marks, Note, Panel
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.service.results.curves import Map
 
 
 def read_figure(figure: Figure, reading: Reading) -> Figure:

@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import Name
-from sprag.service.faults import refused
-from sprag.service.figures.figure import Figure, Fill, Line, Panel, Quantity, line_colours
-from sprag.service.reading.reader import Phrase, joined, plural
-from sprag.service.results.curves import Map
-from sprag.service.results.sweeps import values_text
-from sprag.service.results.tolerances.written import percent
-from sprag.worker.models import ResultInfo
+from sprag_study.sentences import Name
+from sprag_study.service.faults import refused
+from sprag_study.service.figures.figure import Figure, Fill, Line, Panel, Quantity, line_colours
+from sprag_study.service.reading.reader import Phrase, joined, plural
+from sprag_study.service.results.curves import Map
+from sprag_study.service.results.sweeps import values_text
+from sprag_study.service.results.tolerances.written import percent
+from sprag_study.worker.models import ResultInfo
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.results.tolerances.batch import Places
-    from sprag.service.results.tolerances.ribbons import Ribbon, RibbonLine
-    from sprag.service.results.tolerances.yields import Yield
+    from sprag_study.service.results.tolerances.batch import Places
+    from sprag_study.service.results.tolerances.ribbons import Ribbon, RibbonLine
+    from sprag_study.service.results.tolerances.yields import Yield
 
     Numbers = NDArray[np.float64]
 

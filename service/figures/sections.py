@@ -6,20 +6,20 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import Name
-from sprag.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.reader import Phrase, joined, part_label, term
-from sprag.service.reading.wording import number
-from sprag.service.results.regimes import MARKS
-from sprag.service.results.selection import axis_name
-from sprag.worker import models
+from sprag_study.sentences import Name
+from sprag_study.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.reader import Phrase, joined, part_label, term
+from sprag_study.service.reading.wording import number
+from sprag_study.service.results.regimes import MARKS
+from sprag_study.service.results.selection import axis_name
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from sprag.worker.models.sections import CaseSections, Sampling
-    from sprag.worker.study import Study
+    from sprag_study.worker.models.sections import CaseSections, Sampling
+    from sprag_study.worker.study import Study
 
 #: Most points of a figure.
 _MOST: Final = 40_000

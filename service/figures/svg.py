@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.figures.figure import Line
-from sprag.service.figures.orders import motion_text
-from sprag.service.figures.painter.elements import (
+from sprag_study.service.figures.figure import Line
+from sprag_study.service.figures.orders import motion_text
+from sprag_study.service.figures.painter.elements import (
     LINE,
     SMALL,
     cut,
@@ -24,7 +24,7 @@ from sprag.service.figures.painter.elements import (
     text_at,
     text_width,
 )  # fmt: skip
-from sprag.service.figures.painter.legends import (
+from sprag_study.service.figures.painter.legends import (
     MANY,
     Rows,
     blocks,
@@ -34,17 +34,24 @@ from sprag.service.figures.painter.legends import (
     mark_entries,
     rows_of,
 )  # fmt: skip
-from sprag.service.figures.painter.panels import Placed, colour_beside, linked, panel_parts, scale_parts, x_numbers
-from sprag.service.figures.painter.patterns import pattern
-from sprag.service.figures.painter.picture import Painting, panel_group
-from sprag.service.figures.painter.scales import Scale, extent, rounded_scale, tick_text
-from sprag.service.languages import gettext
-from sprag.service.reading.wording import unit_text
+from sprag_study.service.figures.painter.panels import (
+    Placed,
+    colour_beside,
+    linked,
+    panel_parts,
+    scale_parts,
+    x_numbers,
+)
+from sprag_study.service.figures.painter.patterns import pattern
+from sprag_study.service.figures.painter.picture import Painting, panel_group
+from sprag_study.service.figures.painter.scales import Scale, extent, rounded_scale, tick_text
+from sprag_study.service.languages import gettext
+from sprag_study.service.reading.wording import unit_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.figures.figure import Figure, Fill, Panel, Quantity
+    from sprag_study.service.figures.figure import Figure, Fill, Panel, Quantity
 
 #: Widths of a picture that a page has for a wide and for a narrow place (px), and of one in two columns.
 WIDE: Final = 720

@@ -10,21 +10,21 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.figures.figure import Figure, Line, Panel, Quantity, line_colours
-from sprag.service.figures.painter.elements import LINE, SIZE, SMALL, element, lines_of, moved, short, text_at
-from sprag.service.figures.painter.legends import Entry, area, rows_of
-from sprag.service.figures.painter.panels import x_numbers
-from sprag.service.figures.painter.scales import Scale, rounded_scale
-from sprag.service.figures.svg import WIDE, svg, title_of
-from sprag.service.languages import _
-from sprag.service.reading.wording import number
+from sprag_study.service.figures.figure import Figure, Line, Panel, Quantity, line_colours
+from sprag_study.service.figures.painter.elements import LINE, SIZE, SMALL, element, lines_of, moved, short, text_at
+from sprag_study.service.figures.painter.legends import Entry, area, rows_of
+from sprag_study.service.figures.painter.panels import x_numbers
+from sprag_study.service.figures.painter.scales import Scale, rounded_scale
+from sprag_study.service.figures.svg import WIDE, svg, title_of
+from sprag_study.service.languages import _
+from sprag_study.service.reading.wording import number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.reading.reader import Reading
-    from sprag.service.results.sensitivity import Sensitivity
-    from sprag.service.results.sensitivity_indices import Pair
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.service.results.sensitivity import Sensitivity
+    from sprag_study.service.results.sensitivity_indices import Pair
 
 #: Interactions that are drawn, and the least share of one.
 MOST_PAIRS: Final = 6

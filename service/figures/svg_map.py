@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Final, cast
 
 import numpy as np
 
-from sprag.service.figures.curves import doubtful_marks, map_quantities
-from sprag.service.figures.figure import shade
-from sprag.service.figures.orders import TITLE, map_edges, motion_text, order_map
-from sprag.service.figures.painter.bitmap import data_address
-from sprag.service.figures.painter.elements import (
+from sprag_study.service.figures.curves import doubtful_marks, map_quantities
+from sprag_study.service.figures.figure import shade
+from sprag_study.service.figures.orders import TITLE, map_edges, motion_text, order_map
+from sprag_study.service.figures.painter.bitmap import data_address
+from sprag_study.service.figures.painter.elements import (
     LINE,
     SMALL,
     colour_of,
@@ -24,23 +24,23 @@ from sprag.service.figures.painter.elements import (
     short,
     text_width,
 )  # fmt: skip
-from sprag.service.figures.painter.legends import Entry, area, regime_entry, rows_of
-from sprag.service.figures.painter.panels import DIGITS, MOST_LINKS, case_link, colour_scale, x_numbers, y_numbers
-from sprag.service.figures.painter.picture import Painting, panel_group
-from sprag.service.figures.painter.scales import Scale, step_of, tick_text
-from sprag.service.figures.svg import WIDE, as_file, title_of
-from sprag.service.languages import gettext
-from sprag.service.reading.reader import Phrase, plural, shown
-from sprag.service.reading.wording import number, unit_text
-from sprag.service.results.regimes import MARKS
+from sprag_study.service.figures.painter.legends import Entry, area, regime_entry, rows_of
+from sprag_study.service.figures.painter.panels import DIGITS, MOST_LINKS, case_link, colour_scale, x_numbers, y_numbers
+from sprag_study.service.figures.painter.picture import Painting, panel_group
+from sprag_study.service.figures.painter.scales import Scale, step_of, tick_text
+from sprag_study.service.figures.svg import WIDE, as_file, title_of
+from sprag_study.service.languages import gettext
+from sprag_study.service.reading.reader import Phrase, plural, shown
+from sprag_study.service.reading.wording import number, unit_text
+from sprag_study.service.results.regimes import MARKS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
-    from sprag.service.figures.figure import Quantity
-    from sprag.service.results.curves import Map
+    from sprag_study.service.figures.figure import Quantity
+    from sprag_study.service.results.curves import Map
 
     Numbers = NDArray[np.float64]
 
@@ -66,7 +66,8 @@ def map_svg(
     head: Sequence[str] = (),
     below: bool = False,
 ) -> str:
-    """A map, already in its reader's units and words, as an element of a page; as `sprag.service.figures.svg.svg`.
+    """A map, already in its reader's units and words, as an element of a page; as
+    `sprag_study.service.figures.svg.svg`.
 
     Cells without a result are left blank. The outer cells are whole, as those between them.
     """

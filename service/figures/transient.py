@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
-from sprag.service.reading.reader import Phrase
-from sprag.service.results.transient_causes import cause_phrase
+from sprag_study.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
+from sprag_study.service.reading.reader import Phrase
+from sprag_study.service.results.transient_causes import cause_phrase
 
 if TYPE_CHECKING:
-    from sprag.worker.models.transients import Transient
+    from sprag_study.worker.models.transients import Transient
 
 #: Title, unit and lines (variable, label) of each panel.
 _PANELS: Final = (

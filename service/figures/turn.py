@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.figures.figure import Figure, Line, Panel, Quantity
-from sprag.service.figures.motion import motion_figure
-from sprag.service.reading.reader import Phrase
+from sprag_study.service.figures.figure import Figure, Line, Panel, Quantity
+from sprag_study.service.figures.motion import motion_figure
+from sprag_study.service.reading.reader import Phrase
 
 if TYPE_CHECKING:
-    from sprag.worker.models import Presentation, Trajectory
+    from sprag_study.worker.models import Presentation, Trajectory
 
 #: Panels of a motion that are drawn.
 _PANELS: Final = ("speed", "torque")

@@ -17,25 +17,25 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Final
 
-from sprag.sentences import Sentence
-from sprag.service.actor import Actor, Door, Role, share_of
-from sprag.service.faults import shown
-from sprag.service.http.attempts import Attempts
-from sprag.service.http.problems import ApiError
-from sprag.service.http.threads import Threads, in_thread
-from sprag.service.languages import N_
-from sprag.service.languages.recorded import TOKEN_EXPIRED, TOKEN_OF_REMOVED_USER, TOKEN_REVOKED
-from sprag.service.logs import REQUEST_ID
-from sprag.service.storage.part import micros_of
-from sprag.service.storage.people.people import digest_of
-from sprag.service.storage.people.scopes import MAX_USER_NAME, TokenScope, TokenState
+from sprag_study.sentences import Sentence
+from sprag_study.service.actor import Actor, Door, Role, share_of
+from sprag_study.service.faults import shown
+from sprag_study.service.http.attempts import Attempts
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.http.threads import Threads, in_thread
+from sprag_study.service.languages import N_
+from sprag_study.service.languages.recorded import TOKEN_EXPIRED, TOKEN_OF_REMOVED_USER, TOKEN_REVOKED
+from sprag_study.service.logs import REQUEST_ID
+from sprag_study.service.storage.part import micros_of
+from sprag_study.service.storage.people.people import digest_of
+from sprag_study.service.storage.people.scopes import MAX_USER_NAME, TokenScope, TokenState
 
 if TYPE_CHECKING:
     from starlette.datastructures import Headers
     from starlette.types import Scope
 
-    from sprag.service.settings import Settings
-    from sprag.service.storage.people.people import People, SessionSecrets, TokenRecord, UserRecord
+    from sprag_study.service.settings import Settings
+    from sprag_study.service.storage.people.people import People, SessionSecrets, TokenRecord, UserRecord
 
 COOKIE: Final = "sprag_session"
 SESSION_SECONDS: Final = 12 * 3600

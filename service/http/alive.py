@@ -1,4 +1,5 @@
-"""``python -m sprag.service.http.alive``: whether the service of this machine's settings answers, for health checks.
+"""``python -m sprag_study.service.http.alive``: whether the service of this machine's settings answers, for health
+checks.
 
 Host, port and TLS are those of the settings (environment and the file of SPRAG_SETTINGS), as `sprag serve` reads them.
 """
@@ -13,7 +14,7 @@ from typing import Final
 from urllib.error import URLError
 from urllib.request import HTTPSHandler, ProxyHandler, build_opener
 
-from sprag.service.settings import Settings
+from sprag_study.service.settings import Settings
 
 #: Seconds for the answer.
 _SECONDS: Final = 4.0

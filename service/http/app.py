@@ -16,9 +16,9 @@ from fastapi.routing import APIRoute
 from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp
 
-from sprag.service.http import handlers
-from sprag.service.http.access import Access
-from sprag.service.http.api import (
+from sprag_study.service.http import handlers
+from sprag_study.service.http.access import Access
+from sprag_study.service.http.api import (
     case_views,
     cases,
     catalogues,
@@ -35,24 +35,24 @@ from sprag.service.http.api import (
     study_views,
     workers,
 )
-from sprag.service.http.api import (
+from sprag_study.service.http.api import (
     results as api_results,
 )
-from sprag.service.http.api.document import build_openapi
-from sprag.service.http.compression import Compression
-from sprag.service.http.computer import Computes, Limits, ProcessComputer
-from sprag.service.http.context import Context
-from sprag.service.http.drain import Drain
-from sprag.service.http.guard import Guard
-from sprag.service.http.language import InLanguage
-from sprag.service.http.metrics import Metrics
-from sprag.service.http.operation_metrics import OperationCollector, Queue
-from sprag.service.http.prefix import Prefixed
-from sprag.service.http.read_ahead import keep_reading_ahead
-from sprag.service.http.request_log import Noted, RequestLog
-from sprag.service.http.shares import Shares
-from sprag.service.http.sound_store import sound_store
-from sprag.service.http.web import (
+from sprag_study.service.http.api.document import build_openapi
+from sprag_study.service.http.compression import Compression
+from sprag_study.service.http.computer import Computes, Limits, ProcessComputer
+from sprag_study.service.http.context import Context
+from sprag_study.service.http.drain import Drain
+from sprag_study.service.http.guard import Guard
+from sprag_study.service.http.language import InLanguage
+from sprag_study.service.http.metrics import Metrics
+from sprag_study.service.http.operation_metrics import OperationCollector, Queue
+from sprag_study.service.http.prefix import Prefixed
+from sprag_study.service.http.read_ahead import keep_reading_ahead
+from sprag_study.service.http.request_log import Noted, RequestLog
+from sprag_study.service.http.shares import Shares
+from sprag_study.service.http.sound_store import sound_store
+from sprag_study.service.http.web import (
     compare,
     front,
     further,
@@ -65,34 +65,34 @@ from sprag.service.http.web import (
     pages,
     study,
 )
-from sprag.service.http.web import components as component_pages
-from sprag.service.http.web import document as document_pages
-from sprag.service.http.web import live as live_pages
-from sprag.service.http.web import saved_views as view_pages
-from sprag.service.http.web import schedules as schedule_pages
-from sprag.service.http.web import (
+from sprag_study.service.http.web import components as component_pages
+from sprag_study.service.http.web import document as document_pages
+from sprag_study.service.http.web import live as live_pages
+from sprag_study.service.http.web import saved_views as view_pages
+from sprag_study.service.http.web import schedules as schedule_pages
+from sprag_study.service.http.web import (
     study_list as list_pages,
 )
-from sprag.service.http.web.form import live as live_machine
-from sprag.service.http.web.form import page as form
-from sprag.service.http.web.rows import pages as rows
-from sprag.service.jobs import checks
-from sprag.service.jobs.housekeeping import Housekeeping
-from sprag.service.jobs.reports.reporter import Reporter
-from sprag.service.jobs.reports.watchdog import Watchdog, late_runs
-from sprag.service.settings import Settings, UnsafeSettingsError
-from sprag.service.spec import components as component_spec
-from sprag.service.spec import labels
-from sprag.service.spec import saved_views as view_spec
-from sprag.service.spec.extend import EXTENSION
-from sprag.service.spec.schema.document import spec_schema
-from sprag.service.storage.people.people import quota_of
-from sprag.service.storage.readiness import Readiness
-from sprag.service.storage.store import Store
-from sprag.service.views import row_files
-from sprag.service.views.library import Library
-from sprag.worker.chunking import Chunking
-from sprag.worker.limits import (
+from sprag_study.service.http.web.form import live as live_machine
+from sprag_study.service.http.web.form import page as form
+from sprag_study.service.http.web.rows import pages as rows
+from sprag_study.service.jobs import checks
+from sprag_study.service.jobs.housekeeping import Housekeeping
+from sprag_study.service.jobs.reports.reporter import Reporter
+from sprag_study.service.jobs.reports.watchdog import Watchdog, late_runs
+from sprag_study.service.settings import Settings, UnsafeSettingsError
+from sprag_study.service.spec import components as component_spec
+from sprag_study.service.spec import labels
+from sprag_study.service.spec import saved_views as view_spec
+from sprag_study.service.spec.extend import EXTENSION
+from sprag_study.service.spec.schema.document import spec_schema
+from sprag_study.service.storage.people.people import quota_of
+from sprag_study.service.storage.readiness import Readiness
+from sprag_study.service.storage.store import Store
+from sprag_study.service.views import row_files
+from sprag_study.service.views.library import Library
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.limits import (
     COMPUTATION_BYTES,
     FILE_BYTES,
     FILE_PROCESSES,
@@ -103,9 +103,9 @@ from sprag.worker.limits import (
     MAX_COMPUTATIONS,
     MAX_FILES,
 )
-from sprag.worker.pool.child_pool import JobStoppedError
-from sprag.worker.pool.child_process import ProcessDiedError, ProcessStartError
-from sprag.worker.ports import StoreError
+from sprag_study.worker.pool.child_pool import JobStoppedError
+from sprag_study.worker.pool.child_process import ProcessDiedError, ProcessStartError
+from sprag_study.worker.ports import StoreError
 
 _LOG = logging.getLogger("sprag.service")
 #: Seconds before the start of failed processes is retried.
@@ -177,7 +177,7 @@ _ABOUT: Final[dict[str, Any]] = {
     "title": "Sprag",
     "summary": "Parameter studies of vibration drives with freewheel clutches and of machine shafts",
     "description": DESCRIPTION,
-    "version": version("sprag"),
+    "version": version("sprag-study"),
     "openapi_tags": TAGS,
     **dict.fromkeys(("openapi_url", "docs_url", "redoc_url")),
     "redirect_slashes": False,

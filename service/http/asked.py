@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from fastapi import Query
 
-from sprag.service.views.setting import NamedSetting, settings_of
+from sprag_study.service.views.setting import NamedSetting, settings_of
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Collection, Iterable

@@ -19,7 +19,7 @@ from cachetools import TTLCache
 from starlette.datastructures import Headers
 from starlette.types import Scope
 
-from sprag.service.http.problems import ApiError
+from sprag_study.service.http.problems import ApiError
 
 _LOG = logging.getLogger("sprag.access")
 

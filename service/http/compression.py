@@ -11,8 +11,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from werkzeug.datastructures import Accept
 from werkzeug.http import parse_accept_header
 
-from sprag.service import formats
-from sprag.service.http.threads import Threads, in_thread
+from sprag_study.service import formats
+from sprag_study.service.http.threads import Threads, in_thread
 
 #: Shorter answers are not worth it.
 _LEAST_BYTES: Final = 1000

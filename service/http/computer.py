@@ -13,15 +13,15 @@ from typing import Any, Protocol, TypeVar, TypeVarTuple
 
 import anyio
 
-from sprag.sentences import Amount, Sentence
-from sprag.service.faults import Kind
-from sprag.service.http.problems import ApiError
-from sprag.service.http.shares import not_in_time
-from sprag.worker import models
-from sprag.worker.limits import LOAD_SECONDS, PIECE_SECONDS, WALL_TIMES
-from sprag.worker.pool.child_pool import ChildPool, Job, JobStoppedError
-from sprag.worker.pool.child_process import KILL_SECONDS, ProcessDiedError, ProcessStartError, send_piece
-from sprag.worker.pool.processes import limit_memory, single_threaded_children, within_processor_time
+from sprag_study.sentences import Amount, Sentence
+from sprag_study.service.faults import Kind
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.http.shares import not_in_time
+from sprag_study.worker import models
+from sprag_study.worker.limits import LOAD_SECONDS, PIECE_SECONDS, WALL_TIMES
+from sprag_study.worker.pool.child_pool import ChildPool, Job, JobStoppedError
+from sprag_study.worker.pool.child_process import KILL_SECONDS, ProcessDiedError, ProcessStartError, send_piece
+from sprag_study.worker.pool.processes import limit_memory, single_threaded_children, within_processor_time
 
 Args = TypeVarTuple("Args")
 R = TypeVar("R")

@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Annotated, Final, cast
 from fastapi import Depends, Path, Query, Request
 from starlette.convertors import Convertor, register_url_convertor
 
-from sprag.sentences import Sentence
-from sprag.service.http.computer import Computes
-from sprag.service.http.kept_files import KeptFiles
-from sprag.service.http.looks import Looks
-from sprag.service.http.problems import ApiError
-from sprag.service.http.shares import Shares
-from sprag.service.settings import Settings
-from sprag.service.storage.store import Store
-from sprag.service.views.library import Library
-from sprag.worker.limits import (
+from sprag_study.sentences import Sentence
+from sprag_study.service.http.computer import Computes
+from sprag_study.service.http.kept_files import KeptFiles
+from sprag_study.service.http.looks import Looks
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.http.shares import Shares
+from sprag_study.service.settings import Settings
+from sprag_study.service.storage.store import Store
+from sprag_study.service.views.library import Library
+from sprag_study.worker.limits import (
     MAX_CASES,
     MAX_CHECKS,
     MAX_CHECKS_EACH,
@@ -34,7 +34,7 @@ from sprag.worker.limits import (
 )
 
 if TYPE_CHECKING:
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
 CaseNumber = Annotated[
     int,
@@ -60,7 +60,7 @@ class Context:
     ``ending`` is set when the service begins to shut down.
     ``checker`` runs the functions that read, expand, fit or draw user input, and ``library`` gives them the store.
     ``writer`` writes files of rows, and ``sending`` are the places for rows that are sent meanwhile. Requests use all
-    of them through `sprag.service.http.work`, which enforces the share of each token.
+    of them through `sprag_study.service.http.work`, which enforces the share of each token.
     ``streams`` are the places for event streams,
     ``stream_shares`` the share of each token of them, and ``looks`` what these look at.
     ``ready`` is set when the checker accepts work.

@@ -7,14 +7,14 @@ from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.reading.quantities import WORKSHOP
-from sprag.service.reading.reader import Choice
+from sprag_study.service.reading.quantities import WORKSHOP
+from sprag_study.service.reading.reader import Choice
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from sprag.service.http.access import Grant
-    from sprag.service.storage.database.session import Moment
+    from sprag_study.service.http.access import Grant
+    from sprag_study.service.storage.database.session import Moment
 
 
 @dataclass(frozen=True, slots=True)

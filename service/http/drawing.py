@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 from starlette.requests import Request
 from starlette.responses import Response
 
-from sprag.service import languages
-from sprag.service.figures import pictures
-from sprag.service.formats import MEDIA_TYPES, Format
-from sprag.service.http.respond import entity_tag, not_modified, tagged
-from sprag.service.http.threads import in_thread
-from sprag.service.http.work import Work
-from sprag.worker import models
+from sprag_study.service import languages
+from sprag_study.service.figures import pictures
+from sprag_study.service.formats import MEDIA_TYPES, Format
+from sprag_study.service.http.respond import entity_tag, not_modified, tagged
+from sprag_study.service.http.threads import in_thread
+from sprag_study.service.http.work import Work
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
-    from sprag.service.storage.studies.records import StudyRecord
+    from sprag_study.service.storage.studies.records import StudyRecord
 
 #: Formats of what is drawn from rows and written as a table too.
 DRAWN_FORMATS: Final = dict[Literal["json", "csv"] | pictures.Picture, str](

@@ -13,19 +13,19 @@ from starlette.requests import ClientDisconnect, Request, cookie_parser
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from sprag.sentences import Sentence
-from sprag.service.actor import Actor, Role, act_as
-from sprag.service.faults import ParameterFault, shown
-from sprag.service.http.access import OPEN, Access, Grant, token_in
-from sprag.service.http.current import knowing
-from sprag.service.http.problems import ApiError, problem_response
-from sprag.service.http.roles import LOOKING
-from sprag.service.http.web.problem_page import problem_page
-from sprag.service.http.web.way_in import LOGIN_PATH, way_in
-from sprag.service.logs import note_caller
-from sprag.service.settings import Settings
-from sprag.service.storage.errors import StoreError
-from sprag.worker.limits import BODY_SECONDS, MAX_BODY_BYTES, MAX_REQUESTS_EACH
+from sprag_study.sentences import Sentence
+from sprag_study.service.actor import Actor, Role, act_as
+from sprag_study.service.faults import ParameterFault, shown
+from sprag_study.service.http.access import OPEN, Access, Grant, token_in
+from sprag_study.service.http.current import knowing
+from sprag_study.service.http.problems import ApiError, problem_response
+from sprag_study.service.http.roles import LOOKING
+from sprag_study.service.http.web.problem_page import problem_page
+from sprag_study.service.http.web.way_in import LOGIN_PATH, way_in
+from sprag_study.service.logs import note_caller
+from sprag_study.service.settings import Settings
+from sprag_study.service.storage.errors import StoreError
+from sprag_study.worker.limits import BODY_SECONDS, MAX_BODY_BYTES, MAX_REQUESTS_EACH
 
 _LOG = logging.getLogger("sprag.service")
 

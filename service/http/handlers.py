@@ -13,13 +13,13 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
 
-from sprag.sentences import Sentence, Whole, joined, whole
-from sprag.service.faults import FaultError, Kind, parameter_error, shown
-from sprag.service.http.problems import PROBLEM_TYPES, ApiError, api_error, problem_response
-from sprag.service.http.web.problem_page import problem_page
-from sprag.service.storage.errors import PageTokenError, StoreError
-from sprag.service.views.queries import parameter_fault
-from sprag.worker.states import TransitionError
+from sprag_study.sentences import Sentence, Whole, joined, whole
+from sprag_study.service.faults import FaultError, Kind, parameter_error, shown
+from sprag_study.service.http.problems import PROBLEM_TYPES, ApiError, api_error, problem_response
+from sprag_study.service.http.web.problem_page import problem_page
+from sprag_study.service.storage.errors import PageTokenError, StoreError
+from sprag_study.service.views.queries import parameter_fault
+from sprag_study.worker.states import TransitionError
 
 _log = logging.getLogger("sprag.service")
 

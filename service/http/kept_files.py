@@ -21,10 +21,10 @@ import anyio
 from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
 
-from sprag.service.faults import FaultError
-from sprag.service.http.problems import ApiError
-from sprag.service.http.threads import Threads, in_thread, iterated
-from sprag.service.stale_files import mark, sweep
+from sprag_study.service.faults import FaultError
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.http.threads import Threads, in_thread, iterated
+from sprag_study.service.stale_files import mark, sweep
 
 #: All kept files together have at most this size; a larger one is kept alone until the next.
 _MOST_BYTES: Final = 2 * 2**30

@@ -14,7 +14,7 @@ from starlette.requests import cookie_parser
 from werkzeug.datastructures import LanguageAccept
 from werkzeug.http import parse_accept_header
 
-from sprag.service import languages
+from sprag_study.service import languages
 
 if TYPE_CHECKING:
     from starlette.responses import Response

@@ -6,13 +6,13 @@ from typing import Annotated
 
 from fastapi import Depends, Query
 
-from sprag.service.answers.studies import StudyOrder
-from sprag.service.faults import parameter_error
-from sprag.service.storage.people.scopes import MAX_USER_NAME
-from sprag.service.storage.studies.listing import StudyFilter
-from sprag.worker import models
-from sprag.worker.limits import MAX_PAGE_TOKEN, MAX_SEARCH_LENGTH, MAX_TAG_LENGTH
-from sprag.worker.states import StudyState
+from sprag_study.service.answers.studies import StudyOrder
+from sprag_study.service.faults import parameter_error
+from sprag_study.service.storage.people.scopes import MAX_USER_NAME
+from sprag_study.service.storage.studies.listing import StudyFilter
+from sprag_study.worker import models
+from sprag_study.worker.limits import MAX_PAGE_TOKEN, MAX_SEARCH_LENGTH, MAX_TAG_LENGTH
+from sprag_study.worker.states import StudyState
 
 PageToken = Annotated[
     str | None, Query(min_length=1, max_length=MAX_PAGE_TOKEN, description="`next_page_token` of the page before")

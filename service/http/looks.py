@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from anyio import sleep as _pause
 
-from sprag.service.http.threads import Threads, in_thread
+from sprag_study.service.http.threads import Threads, in_thread
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Hashable

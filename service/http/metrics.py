@@ -16,15 +16,15 @@ from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Counter, G
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
 from prometheus_client.registry import Collector
 
-from sprag.service.jobs.reports.watchdog import late_runs
-from sprag.worker import models
-from sprag.worker.states import StudyState
+from sprag_study.service.jobs.reports.watchdog import late_runs
+from sprag_study.worker import models
+from sprag_study.worker.states import StudyState
 
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from sprag.service.storage.figures import FinishedWork
-    from sprag.service.storage.store import Store
+    from sprag_study.service.storage.figures import FinishedWork
+    from sprag_study.service.storage.store import Store
 
 CONTENT_TYPE: Final = CONTENT_TYPE_LATEST
 METHODS: Final = frozenset({"GET", "HEAD", "POST", "PATCH", "DELETE"})
@@ -63,7 +63,7 @@ class Metrics:
         for collector in (StudyCollector(store), *more):
             self._registry.register(collector)
         about = Info("sprag", "The program that answers.", registry=self._registry)
-        about.info({"version": version("sprag"), "engine": models.ENGINE_VERSION})
+        about.info({"version": version("sprag-study"), "engine": models.ENGINE_VERSION})
         store.session.on_wait = self.waited
 
     def begun(self) -> None:

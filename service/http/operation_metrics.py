@@ -12,18 +12,18 @@ from typing import TYPE_CHECKING, Any, Final
 from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
-from sprag.service.jobs.maintenance import backups
-from sprag.service.jobs.nights import why_off
-from sprag.service.schedules.outcomes import Result
-from sprag.service.storage.schedules.runs import RunState
+from sprag_study.service.jobs.maintenance import backups
+from sprag_study.service.jobs.nights import why_off
+from sprag_study.service.schedules.outcomes import Result
+from sprag_study.service.storage.schedules.runs import RunState
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from sprag.service.http.shares import Shares
-    from sprag.service.settings import Settings
-    from sprag.service.storage.schedules.runs import ScheduleRecord
-    from sprag.service.storage.store import Store
+    from sprag_study.service.http.shares import Shares
+    from sprag_study.service.settings import Settings
+    from sprag_study.service.storage.schedules.runs import ScheduleRecord
+    from sprag_study.service.storage.store import Store
 
 #: States of workers in the reports of executors.
 WORKER_STATES: Final = ("usable", "busy", "refused")

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Annotated
 
 from fastapi import Query
 
-from sprag.service.answers import filled
-from sprag.service.answers.people import QuotaUse, User
-from sprag.service.storage.people.audit import TIME_ALLOWED
-from sprag.service.storage.people.people import Quota
+from sprag_study.service.answers import filled
+from sprag_study.service.answers.people import QuotaUse, User
+from sprag_study.service.storage.people.audit import TIME_ALLOWED
+from sprag_study.service.storage.people.people import Quota
 
 if TYPE_CHECKING:
-    from sprag.service.storage.people.people import People, UserRecord
+    from sprag_study.service.storage.people.people import People, UserRecord
 
 Since = Annotated[
     str | None, Query(max_length=40, description=f"from then on: {TIME_ALLOWED}", examples=["2027-01-31"])

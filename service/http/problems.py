@@ -7,8 +7,8 @@ from typing import Any, Final, cast
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.responses import Response
 
-from sprag.service.faults import Fault, FaultError, Kind
-from sprag.service.json_text import to_bytes
+from sprag_study.service.faults import Fault, FaultError, Kind
+from sprag_study.service.json_text import to_bytes
 
 PROBLEM_MEDIA_TYPE = "application/problem+json"
 PROBLEM_PATH = "/problems/"

@@ -6,14 +6,14 @@ import asyncio
 import logging
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.http.problems import ApiError
-from sprag.service.http.threads import in_thread
-from sprag.service.views import explore
-from sprag.worker.pool.child_pool import JobStoppedError
-from sprag.worker.ports import StoreError
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.http.threads import in_thread
+from sprag_study.service.views import explore
+from sprag_study.worker.pool.child_pool import JobStoppedError
+from sprag_study.worker.ports import StoreError
 
 if TYPE_CHECKING:
-    from sprag.service.http.context import Context
+    from sprag_study.service.http.context import Context
 
 _LOG = logging.getLogger("sprag.service")
 

@@ -8,13 +8,13 @@ from urllib.parse import quote, unquote, urlencode, urlsplit
 
 from fastapi import Depends, Query, Request
 
-from sprag.service.faults import SelectionError
-from sprag.service.http.context import Ctx
-from sprag.service.http.current import current, learn
-from sprag.service.http.language import language_pairs
-from sprag.service.reading.quantities import SI, UNITS_PATTERN, read_units
-from sprag.service.reading.reader import CAPTIONS, CODES, Choice
-from sprag.service.zones import is_zone
+from sprag_study.service.faults import SelectionError
+from sprag_study.service.http.context import Ctx
+from sprag_study.service.http.current import current, learn
+from sprag_study.service.http.language import language_pairs
+from sprag_study.service.reading.quantities import SI, UNITS_PATTERN, read_units
+from sprag_study.service.reading.reader import CAPTIONS, CODES, Choice
+from sprag_study.service.zones import is_zone
 
 if TYPE_CHECKING:
     from starlette.responses import Response

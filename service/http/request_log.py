@@ -11,7 +11,7 @@ from typing import Final, Protocol
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from sprag.service.logs import CALLER, REQUEST_ID, REQUESTS, STUDY_ID, note_caller
+from sprag_study.service.logs import CALLER, REQUEST_ID, REQUESTS, STUDY_ID, note_caller
 
 REQUEST_HEADER: Final = "X-Request-ID"
 _GIVEN_ID: Final = re.compile(r"[A-Za-z0-9_-]{1,64}")

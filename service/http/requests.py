@@ -11,10 +11,10 @@ from fastapi import Header, Request
 from fastapi.dependencies.models import Dependant
 from werkzeug.http import parse_etags
 
-from sprag.service.faults import ParameterFault, shown
-from sprag.service.http.problems import ApiError
-from sprag.service.reading.texts import did_you_mean
-from sprag.service.spec.report import SpecError
+from sprag_study.service.faults import ParameterFault, shown
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.reading.texts import did_you_mean
+from sprag_study.service.spec.report import SpecError
 
 BodyFormat = Literal["json", "toml"]
 _FORMATS: dict[str, BodyFormat] = {"application/json": "json", "application/toml": "toml"}

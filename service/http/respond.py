@@ -15,11 +15,11 @@ from starlette.types import Receive, Scope, Send
 from werkzeug.datastructures import MIMEAccept
 from werkzeug.http import parse_accept_header, parse_etags
 
-from sprag import service
-from sprag.service.faults import choice_of, shown
-from sprag.service.http.problems import ApiError
-from sprag.service.json_text import to_bytes
-from sprag.worker.models import source_hash
+from sprag_study import service
+from sprag_study.service.faults import choice_of, shown
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.json_text import to_bytes
+from sprag_study.worker.models import source_hash
 
 JSON = "application/json"
 

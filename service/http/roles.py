@@ -1,7 +1,7 @@
 """The role that each route needs. A route that is not listed here is for administrators only.
 
 Reading is for everybody who may use the service; what changes something is for designers, who can change their own
-and what has no owner (`sprag.service.storage.people.audit.require_own`).
+and what has no owner (`sprag_study.service.storage.people.audit.require_own`).
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Final, cast
 
 from starlette.requests import Request
 
-from sprag.service.actor import Role
-from sprag.service.http.problems import ApiError
-from sprag.service.http.request_log import pattern_of
+from sprag_study.service.actor import Role
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.http.request_log import pattern_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from sprag.service.http.access import Grant
+    from sprag_study.service.http.access import Grant
 
 _S: Final = "/api/v1/studies/{study_id}"
 _CASE: Final = _S + "/cases/{case}"

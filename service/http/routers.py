@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 
 from fastapi import APIRouter, Depends
 
-from sprag.service.http.reading import page_choice
-from sprag.service.http.requests import strict_query
-from sprag.service.http.roles import require_role
-from sprag.service.http.threads import ThreadedRoute
-from sprag.service.http.views import API_PREFIX
+from sprag_study.service.http.reading import page_choice
+from sprag_study.service.http.requests import strict_query
+from sprag_study.service.http.roles import require_role
+from sprag_study.service.http.threads import ThreadedRoute
+from sprag_study.service.http.views import API_PREFIX
 
 if TYPE_CHECKING:
     from fastapi.routing import APIRoute

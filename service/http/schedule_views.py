@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from sprag.service.answers import filled
-from sprag.service.answers.schedules import ScheduleDetail, ScheduleList, ScheduleRun, ScheduleSummary
-from sprag.service.http.prefix import here
-from sprag.service.http.views import API_PREFIX, study_address
-from sprag.service.jobs.nights import outcome_json, why_off
-from sprag.service.schedules.times import local_time
+from sprag_study.service.answers import filled
+from sprag_study.service.answers.schedules import ScheduleDetail, ScheduleList, ScheduleRun, ScheduleSummary
+from sprag_study.service.http.prefix import here
+from sprag_study.service.http.views import API_PREFIX, study_address
+from sprag_study.service.jobs.nights import outcome_json, why_off
+from sprag_study.service.schedules.times import local_time
 
 if TYPE_CHECKING:
-    from sprag.service.storage.schedules.runs import RunRecord, ScheduleRecord
-    from sprag.service.storage.store import Store
+    from sprag_study.service.storage.schedules.runs import RunRecord, ScheduleRecord
+    from sprag_study.service.storage.store import Store
 
 
 def schedule_address(schedule_id: str) -> str:

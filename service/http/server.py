@@ -18,13 +18,13 @@ from typing import Protocol
 import psutil
 import uvicorn
 
-from sprag.service import logs
-from sprag.service.http.app import create_app
-from sprag.service.http.timeouts import READING
-from sprag.service.http.tls import LOOK_SECONDS, Certificate
-from sprag.service.jobs.dispatching import start_dispatcher_process, worker_settings
-from sprag.service.settings import Settings
-from sprag.worker.limits import MAX_CONNECTIONS
+from sprag_study.service import logs
+from sprag_study.service.http.app import create_app
+from sprag_study.service.http.timeouts import READING
+from sprag_study.service.http.tls import LOOK_SECONDS, Certificate
+from sprag_study.service.jobs.dispatching import start_dispatcher_process, worker_settings
+from sprag_study.service.settings import Settings
+from sprag_study.worker.limits import MAX_CONNECTIONS
 
 _LOG = logging.getLogger("sprag.service")
 

@@ -6,7 +6,7 @@ import asyncio
 from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING
 
-from sprag.service.http.problems import ApiError
+from sprag_study.service.http.problems import ApiError
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator

@@ -6,14 +6,14 @@ import logging
 import time
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.storage.errors import DatabaseError
-from sprag.service.storage.store import Store
+from sprag_study.service.storage.errors import DatabaseError
+from sprag_study.service.storage.store import Store
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from sprag.service.settings import Settings
-    from sprag.worker.chunking import Chunking
+    from sprag_study.service.settings import Settings
+    from sprag_study.worker.chunking import Chunking
 
 _LOG = logging.getLogger("sprag.service")
 

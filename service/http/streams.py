@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, Final
 
 from starlette.responses import Response, StreamingResponse
 
-from sprag.service.http.access import OPEN
-from sprag.service.http.current import current
-from sprag.service.http.problems import ApiError
-from sprag.service.json_text import to_bytes
-from sprag.service.storage.errors import StoreError
-from sprag.worker.limits import MAX_STREAMS
+from sprag_study.service.http.access import OPEN
+from sprag_study.service.http.current import current
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.json_text import to_bytes
+from sprag_study.service.storage.errors import StoreError
+from sprag_study.worker.limits import MAX_STREAMS
 
 if TYPE_CHECKING:
     from starlette.types import Receive, Scope, Send
 
-    from sprag.service.http.context import Context
-    from sprag.service.http.looks import Seen
+    from sprag_study.service.http.context import Context
+    from sprag_study.service.http.looks import Seen
 
 MEDIA_TYPE: Final = "text/event-stream"
 #: Seconds between two looks at a study, and at a list, which costs more.

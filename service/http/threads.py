@@ -12,10 +12,10 @@ import anyio
 from anyio.lowlevel import RunVar
 from fastapi.routing import APIRoute
 
-from sprag.service.http.current import current, knowing
-from sprag.service.http.problems import ApiError
-from sprag.service.storage.database.session import Moment
-from sprag.worker.limits import LOCK_SECONDS, WRITING_THREADS
+from sprag_study.service.http.current import current, knowing
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.storage.database.session import Moment
+from sprag_study.worker.limits import LOCK_SECONDS, WRITING_THREADS
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Callable, Iterable

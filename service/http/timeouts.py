@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from sprag.worker.limits import HEAD_SECONDS, MAX_HEAD_BYTES, WRITE_SECONDS
+from sprag_study.worker.limits import HEAD_SECONDS, MAX_HEAD_BYTES, WRITE_SECONDS
 
 
 class TimeoutProtocol(H11Protocol):

@@ -6,33 +6,33 @@ from dataclasses import asdict
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final, cast
 
-from sprag.service.answers import filled
-from sprag.service.answers.catalogue import Preset
-from sprag.service.answers.results import CaseDetail, RegimeRow
-from sprag.service.answers.studies import FullProgress, Origin, StudyDetail, StudySummary
-from sprag.service.exports import row_json
-from sprag.service.faults import warned
-from sprag.service.http.prefix import here
-from sprag.service.http.respond import edition_tag
-from sprag.service.presets import ABOUT, preset_text
-from sprag.service.reading.catalogue import axes_json
-from sprag.service.reading.directions import case_units, case_values
-from sprag.service.results.fronts import goal_units
-from sprag.service.results.rounds import rounds_json
-from sprag.service.spec.document import format_of, load_spec
-from sprag.service.storage.studies.records import CaseRow
-from sprag.worker import models
-from sprag.worker.codes import PENDING
-from sprag.worker.models.abilities import has_transients
+from sprag_study.service.answers import filled
+from sprag_study.service.answers.catalogue import Preset
+from sprag_study.service.answers.results import CaseDetail, RegimeRow
+from sprag_study.service.answers.studies import FullProgress, Origin, StudyDetail, StudySummary
+from sprag_study.service.exports import row_json
+from sprag_study.service.faults import warned
+from sprag_study.service.http.prefix import here
+from sprag_study.service.http.respond import edition_tag
+from sprag_study.service.presets import ABOUT, preset_text
+from sprag_study.service.reading.catalogue import axes_json
+from sprag_study.service.reading.directions import case_units, case_values
+from sprag_study.service.results.fronts import goal_units
+from sprag_study.service.results.rounds import rounds_json
+from sprag_study.service.spec.document import format_of, load_spec
+from sprag_study.service.storage.studies.records import CaseRow
+from sprag_study.worker import models
+from sprag_study.worker.codes import PENDING
+from sprag_study.worker.models.abilities import has_transients
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.storage.rows.origins import Origin as OriginRecord
-    from sprag.service.storage.store import Store
-    from sprag.service.storage.studies.records import Kinds, Progress, StudyRecord
-    from sprag.service.views.library import Library
-    from sprag.worker.study import Study
+    from sprag_study.service.storage.rows.origins import Origin as OriginRecord
+    from sprag_study.service.storage.store import Store
+    from sprag_study.service.storage.studies.records import Kinds, Progress, StudyRecord
+    from sprag_study.service.views.library import Library
+    from sprag_study.worker.study import Study
 
 API_PREFIX: Final = "/api/v1"
 

@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Annotated, Final, TypeVar, TypeVarTuple, cast
 from fastapi import Depends, Request
 from starlette.requests import ClientDisconnect
 
-from sprag.service import languages
-from sprag.service.http.access import OPEN
-from sprag.service.http.context import study_with
-from sprag.service.http.respond import streamed
-from sprag.service.http.shares import turn
-from sprag.service.http.threads import end_moment, in_thread
-from sprag.service.languages.elsewhere import speak
-from sprag.service.results.start_states import check_start
-from sprag.service.spec.machine.shaft_check import NotCompiledError
-from sprag.service.storage.database.session import in_one_moment
-from sprag.worker import models
-from sprag.worker.limits import FILE_WAIT_SECONDS
+from sprag_study.service import languages
+from sprag_study.service.http.access import OPEN
+from sprag_study.service.http.context import study_with
+from sprag_study.service.http.respond import streamed
+from sprag_study.service.http.shares import turn
+from sprag_study.service.http.threads import end_moment, in_thread
+from sprag_study.service.languages.elsewhere import speak
+from sprag_study.service.results.start_states import check_start
+from sprag_study.service.spec.machine.shaft_check import NotCompiledError
+from sprag_study.service.storage.database.session import in_one_moment
+from sprag_study.worker import models
+from sprag_study.worker.limits import FILE_WAIT_SECONDS
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Callable, Coroutine, Iterator
@@ -29,12 +29,12 @@ if TYPE_CHECKING:
 
     from starlette.responses import Response
 
-    from sprag.service.http.access import Grant
-    from sprag.service.http.computer import Computes
-    from sprag.service.http.context import Context
-    from sprag.service.http.shares import Shares
-    from sprag.worker.models import KernelShape
-    from sprag.worker.study import Study
+    from sprag_study.service.http.access import Grant
+    from sprag_study.service.http.computer import Computes
+    from sprag_study.service.http.context import Context
+    from sprag_study.service.http.shares import Shares
+    from sprag_study.worker.models import KernelShape
+    from sprag_study.worker.study import Study
 
 #: Problems that any check can lead to.
 CHECK_PROBLEMS: Final = ("too-costly", "not-computed", "too-many-requests", "unavailable")

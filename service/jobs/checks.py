@@ -11,39 +11,39 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.faults import FaultError, parameter_error
-from sprag.service.jobs.preview import preview_json
-from sprag.service.jobs.start_from import with_start
-from sprag.service.jobs.submission import Submission, hash_of, submission
-from sprag.service.json_text import to_bytes
-from sprag.service.reading import units
-from sprag.service.results.fits import fit_json, read_fit
-from sprag.service.results.regimes import UNSETTLED
-from sprag.service.results.selection import locate_axes
-from sprag.service.schedules.fields import ScheduleFields, change_fields, read_fields
-from sprag.service.spec.components import Component, read_components
-from sprag.service.spec.document import load_spec, parse_spec
-from sprag.service.spec.extend import parse_extended
-from sprag.service.spec.labels import StudyChange, read_change
-from sprag.service.spec.longer import longer_spec, runs_over_time
-from sprag.service.spec.machine.shaft_check import compile_elsewhere
-from sprag.service.spec.narrow import narrowed_spec, swept_axis
-from sprag.service.spec.report import SpecError
-from sprag.service.spec.saved_views import View, ViewChange, read_view, read_view_change
-from sprag.service.spec.stored import accepted
-from sprag.service.views.explore import selection_spec
-from sprag.service.views.library import Library
-from sprag.worker import models
+from sprag_study.service.faults import FaultError, parameter_error
+from sprag_study.service.jobs.preview import preview_json
+from sprag_study.service.jobs.start_from import with_start
+from sprag_study.service.jobs.submission import Submission, hash_of, submission
+from sprag_study.service.json_text import to_bytes
+from sprag_study.service.reading import units
+from sprag_study.service.results.fits import fit_json, read_fit
+from sprag_study.service.results.regimes import UNSETTLED
+from sprag_study.service.results.selection import locate_axes
+from sprag_study.service.schedules.fields import ScheduleFields, change_fields, read_fields
+from sprag_study.service.spec.components import Component, read_components
+from sprag_study.service.spec.document import load_spec, parse_spec
+from sprag_study.service.spec.extend import parse_extended
+from sprag_study.service.spec.labels import StudyChange, read_change
+from sprag_study.service.spec.longer import longer_spec, runs_over_time
+from sprag_study.service.spec.machine.shaft_check import compile_elsewhere
+from sprag_study.service.spec.narrow import narrowed_spec, swept_axis
+from sprag_study.service.spec.report import SpecError
+from sprag_study.service.spec.saved_views import View, ViewChange, read_view, read_view_change
+from sprag_study.service.spec.stored import accepted
+from sprag_study.service.views.explore import selection_spec
+from sprag_study.service.views.library import Library
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from datetime import datetime
 
-    from sprag.sentences import WarningText
-    from sprag.service.results.explore import ExploreQuery
-    from sprag.service.spec.text import Format
-    from sprag.service.storage.store import Store
-    from sprag.worker.study import Study
+    from sprag_study.sentences import WarningText
+    from sprag_study.service.results.explore import ExploreQuery
+    from sprag_study.service.spec.text import Format
+    from sprag_study.service.storage.store import Store
+    from sprag_study.worker.study import Study
 
 #: Fields of a schedule by which it is paused and resumed, and the most bytes of a body with them.
 _PAUSING: Final = frozenset({"enabled", "paused_until"})

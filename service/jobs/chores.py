@@ -6,13 +6,13 @@ import logging
 import threading
 from typing import TYPE_CHECKING, Final, Protocol
 
-from sprag.service.storage.database.lock import DispatcherLock
-from sprag.service.storage.errors import StoreError
+from sprag_study.service.storage.database.lock import DispatcherLock
+from sprag_study.service.storage.errors import StoreError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.storage.database.server_lock import ServerLock
+    from sprag_study.service.storage.database.server_lock import ServerLock
 
 _LOG = logging.getLogger("sprag.chores")
 

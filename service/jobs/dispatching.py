@@ -12,38 +12,38 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sprag.service import logs
-from sprag.service.delivery import Delivery
-from sprag.service.jobs.chores import Chores
-from sprag.service.jobs.housekeeping import Housekeeping, Scrubbing
-from sprag.service.jobs.maintenance import Maintenance, MaintenancePlan
-from sprag.service.jobs.reports.reporter import Reporter
-from sprag.service.jobs.reports.watchdog import Watchdog
-from sprag.service.jobs.scheduler import Scheduler
-from sprag.service.logs import LogFormat
-from sprag.service.storage.database.lock import DispatcherLock
-from sprag.service.storage.database.session import file_of
-from sprag.service.storage.errors import DatabaseError
-from sprag.service.storage.part import SILENT_SECONDS, SystemClock
-from sprag.service.storage.people.people import Quota, quota_of
-from sprag.service.storage.readiness import LOCKED_SECONDS
-from sprag.service.storage.store import Store
-from sprag.worker import models
-from sprag.worker.chunking import Chunking
-from sprag.worker.dispatcher import Dispatcher
-from sprag.worker.pool.processes import end_with_parent, ignore_interrupts, interrupts_held_back
-from sprag.worker.ports import EpochLostError, ExecutorError, StoreError
+from sprag_study.service import logs
+from sprag_study.service.delivery import Delivery
+from sprag_study.service.jobs.chores import Chores
+from sprag_study.service.jobs.housekeeping import Housekeeping, Scrubbing
+from sprag_study.service.jobs.maintenance import Maintenance, MaintenancePlan
+from sprag_study.service.jobs.reports.reporter import Reporter
+from sprag_study.service.jobs.reports.watchdog import Watchdog
+from sprag_study.service.jobs.scheduler import Scheduler
+from sprag_study.service.logs import LogFormat
+from sprag_study.service.storage.database.lock import DispatcherLock
+from sprag_study.service.storage.database.session import file_of
+from sprag_study.service.storage.errors import DatabaseError
+from sprag_study.service.storage.part import SILENT_SECONDS, SystemClock
+from sprag_study.service.storage.people.people import Quota, quota_of
+from sprag_study.service.storage.readiness import LOCKED_SECONDS
+from sprag_study.service.storage.store import Store
+from sprag_study.worker import models
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.dispatcher import Dispatcher
+from sprag_study.worker.pool.processes import end_with_parent, ignore_interrupts, interrupts_held_back
+from sprag_study.worker.ports import EpochLostError, ExecutorError, StoreError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from multiprocessing.context import SpawnProcess
     from types import FrameType
 
-    from sprag.service.settings import Settings
-    from sprag.service.storage.database.server_lock import ServerLock
-    from sprag.worker.ports import Executor
+    from sprag_study.service.settings import Settings
+    from sprag_study.service.storage.database.server_lock import ServerLock
+    from sprag_study.worker.ports import Executor
 
-_LOG = logging.getLogger(__name__)
+_LOG = logging.getLogger("sprag.service")
 
 #: Seconds between two attempts of a standby to take the lock.
 STANDBY_SECONDS = 0.3
@@ -111,16 +111,16 @@ def pool(settings: WorkerSettings) -> Executor:
     """The executor of these settings: Dask, or a process pool whose processes start with the first chunk."""
     if settings.executor != "pool":
         return _cluster(settings)
-    from sprag.worker.executors.process_pool import ProcessPoolExecutor
+    from sprag_study.worker.executors.process_pool import ProcessPoolExecutor
 
     return ProcessPoolExecutor(settings.processes, chunk_timeout=settings.chunk_timeout)
 
 
 def _cluster(settings: WorkerSettings, *, renew: bool = False) -> Executor:
     try:
-        from sprag.worker.executors.dask import DaskExecutor
+        from sprag_study.worker.executors.dask import DaskExecutor
     except ImportError:
-        raise ExecutorError("Dask is not installed: pip install 'sprag[cluster]'") from None
+        raise ExecutorError("Dask is not installed: pip install 'sprag-study[cluster]'") from None
     url = settings.executor if "://" in settings.executor else ""
     return DaskExecutor(url, settings.processes, chunk_timeout=settings.chunk_timeout, renew=renew)
 

@@ -7,12 +7,12 @@ import threading
 import time
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.storage.errors import StoreError
+from sprag_study.service.storage.errors import StoreError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from sprag.service.storage.store import Store
+    from sprag_study.service.storage.store import Store
 
 _LOG = logging.getLogger("sprag.housekeeping")
 

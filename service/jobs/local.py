@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.jobs.dispatching import (
+from sprag_study.service.jobs.dispatching import (
     STANDBY_SECONDS,
     StopFlag,
     WorkerSettings,
@@ -21,27 +21,27 @@ from sprag.service.jobs.dispatching import (
     pool,
     renewed_pool,
 )
-from sprag.service.stale_files import marked, sweep
-from sprag.service.storage.part import SystemClock
-from sprag.service.storage.store import Store
-from sprag.service.storage.work.dispatchers import run_owner
-from sprag.service.storage.work.room import GOES_ON
-from sprag.worker.chunking import Chunking
-from sprag.worker.dispatcher import Dispatcher
-from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.models import estimate_seconds_per_case
-from sprag.worker.planning import most_cases
-from sprag.worker.ports import ExecutorError, StoreError
-from sprag.worker.states import StudyState, TransitionError
+from sprag_study.service.stale_files import marked, sweep
+from sprag_study.service.storage.part import SystemClock
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.work.dispatchers import run_owner
+from sprag_study.service.storage.work.room import GOES_ON
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.dispatcher import Dispatcher
+from sprag_study.worker.executors.inline import InlineExecutor
+from sprag_study.worker.models import estimate_seconds_per_case
+from sprag_study.worker.planning import most_cases
+from sprag_study.worker.ports import ExecutorError, StoreError
+from sprag_study.worker.states import StudyState, TransitionError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
     from datetime import datetime
     from types import FrameType
 
-    from sprag.service.storage.studies.records import Progress, StudyRecord
-    from sprag.worker.ports import Executor
-    from sprag.worker.study import Study
+    from sprag_study.service.storage.studies.records import Progress, StudyRecord
+    from sprag_study.worker.ports import Executor
+    from sprag_study.worker.study import Study
 
 _FOLDER_PREFIX = "sprag-run-"
 #: Endings of the reason of a study held for lack of space; they apply to services, not here.

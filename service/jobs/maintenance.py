@@ -17,16 +17,16 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.actor import Actor, Door, act_as
-from sprag.service.schedules.times import Timing, read_time_of_day
-from sprag.service.stale_files import sweep
-from sprag.service.storage.clock_watch import ClockWatch
-from sprag.service.storage.database.private_files import PRIVATE_FOLDER_MODE
-from sprag.service.storage.errors import StoreError
-from sprag.service.storage.maintenance import PART_SUFFIX
+from sprag_study.service.actor import Actor, Door, act_as
+from sprag_study.service.schedules.times import Timing, read_time_of_day
+from sprag_study.service.stale_files import sweep
+from sprag_study.service.storage.clock_watch import ClockWatch
+from sprag_study.service.storage.database.private_files import PRIVATE_FOLDER_MODE
+from sprag_study.service.storage.errors import StoreError
+from sprag_study.service.storage.maintenance import PART_SUFFIX
 
 if TYPE_CHECKING:
-    from sprag.service.storage.store import Store
+    from sprag_study.service.storage.store import Store
 
 _LOG = logging.getLogger("sprag.maintenance")
 

@@ -6,24 +6,24 @@ from dataclasses import replace
 from datetime import timedelta
 from typing import TYPE_CHECKING, Final
 
-from sprag.sentences import Sentence
-from sprag.service.answers import filled
-from sprag.service.answers.schedules import Night, NightRun, RunOutcome, SentReport
-from sprag.service.delivery import origin_of
-from sprag.service.jobs.reports.watchdog import late_json, late_runs
-from sprag.service.json_text import timestamp
-from sprag.service.languages import recorded
-from sprag.service.schedules.times import local_time
-from sprag.service.schedules.trouble import usual_flags
-from sprag.service.storage.errors import StudyNotFoundError
-from sprag.worker import models
+from sprag_study.sentences import Sentence
+from sprag_study.service.answers import filled
+from sprag_study.service.answers.schedules import Night, NightRun, RunOutcome, SentReport
+from sprag_study.service.delivery import origin_of
+from sprag_study.service.jobs.reports.watchdog import late_json, late_runs
+from sprag_study.service.json_text import timestamp
+from sprag_study.service.languages import recorded
+from sprag_study.service.schedules.times import local_time
+from sprag_study.service.schedules.trouble import usual_flags
+from sprag_study.service.storage.errors import StudyNotFoundError
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
-    from sprag.service.schedules.outcomes import Outcome
-    from sprag.service.storage.schedules.reports import ReportRecord
-    from sprag.service.storage.schedules.runs import EndedRun
-    from sprag.service.storage.schedules.runs import NightRun as Run
-    from sprag.service.storage.store import Store
+    from sprag_study.service.schedules.outcomes import Outcome
+    from sprag_study.service.storage.schedules.reports import ReportRecord
+    from sprag_study.service.storage.schedules.runs import EndedRun
+    from sprag_study.service.storage.schedules.runs import NightRun as Run
+    from sprag_study.service.storage.store import Store
 
 #: Hours that are looked back on by default, and at most.
 HOURS: Final = 24

@@ -6,7 +6,7 @@ import threading
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar, Final
 
-from sprag.service.storage.errors import StoreError
+from sprag_study.service.storage.errors import StoreError
 
 if TYPE_CHECKING:
     import logging

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag.service.faults import warned
-from sprag.service.reading.catalogue import axes_json
-from sprag.service.results.fits import fit_json
-from sprag.service.schedules.deadline import finish_warnings
-from sprag.worker import models
-from sprag.worker.chunking import work_of
-from sprag.worker.planning import most_cases, planner_of
+from sprag_study.service.faults import warned
+from sprag_study.service.reading.catalogue import axes_json
+from sprag_study.service.results.fits import fit_json
+from sprag_study.service.schedules.deadline import finish_warnings
+from sprag_study.worker import models
+from sprag_study.worker.chunking import work_of
+from sprag_study.worker.planning import most_cases, planner_of
 
 if TYPE_CHECKING:
-    from sprag.service.answers.studies import Preview
-    from sprag.service.spec.document import ParsedSpec
-    from sprag.worker.chunking import Chunking
-    from sprag.worker.study import Study
+    from sprag_study.service.answers.studies import Preview
+    from sprag_study.service.spec.document import ParsedSpec
+    from sprag_study.worker.chunking import Chunking
+    from sprag_study.worker.study import Study
 
 _FIRST_CASES = 5
 #: Bytes of a row besides its results: key, case number, ending, flags and SQLite's header.

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from sprag.service.report.chosen_figures import require_figure
+from sprag_study.service.report.chosen_figures import require_figure
 
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from sprag.service.spec.saved_views import View, ViewChange
-    from sprag.service.storage.saved_views import SavedView
-    from sprag.service.storage.store import Store
+    from sprag_study.service.spec.saved_views import View, ViewChange
+    from sprag_study.service.storage.saved_views import SavedView
+    from sprag_study.service.storage.store import Store
 
 
 def save_view(store: Store, view: View) -> SavedView:

@@ -12,24 +12,24 @@ from contextlib import suppress
 from datetime import timedelta
 from typing import TYPE_CHECKING, cast
 
-from sprag.sentences import Sentence
-from sprag.service.actor import Actor, Door, act_as
-from sprag.service.jobs.nights import conclude_runs
-from sprag.service.jobs.polling import PollingThread
-from sprag.service.languages import recorded
-from sprag.service.languages.earlier import sentence_in
-from sprag.service.schedules.policies import Overlap, due_times
-from sprag.service.storage.errors import RunClosedError, StudyNotFoundError
-from sprag.service.storage.part import moment
-from sprag.worker.states import TransitionError
+from sprag_study.sentences import Sentence
+from sprag_study.service.actor import Actor, Door, act_as
+from sprag_study.service.jobs.nights import conclude_runs
+from sprag_study.service.jobs.polling import PollingThread
+from sprag_study.service.languages import recorded
+from sprag_study.service.languages.earlier import sentence_in
+from sprag_study.service.schedules.policies import Overlap, due_times
+from sprag_study.service.storage.errors import RunClosedError, StudyNotFoundError
+from sprag_study.service.storage.part import moment
+from sprag_study.worker.states import TransitionError
 
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from sprag.service.storage.schedules.runs import OpenRun, ScheduleRecord
-    from sprag.service.storage.schedules.schedules import BoundStudy
-    from sprag.service.storage.store import Store
-    from sprag.worker.study import Study
+    from sprag_study.service.storage.schedules.runs import OpenRun, ScheduleRecord
+    from sprag_study.service.storage.schedules.schedules import BoundStudy
+    from sprag_study.service.storage.store import Store
+    from sprag_study.worker.study import Study
 
 _LOG = logging.getLogger("sprag.schedules")
 
@@ -120,11 +120,11 @@ class Scheduler(PollingThread):
     def _submit(self, run: OpenRun) -> None:
         from dataclasses import replace
 
-        from sprag.service.faults import FaultError
-        from sprag.service.jobs.submission import accept
-        from sprag.service.spec.document import parse_spec
-        from sprag.service.spec.report import SpecError
-        from sprag.service.spec.stored import accepted
+        from sprag_study.service.faults import FaultError
+        from sprag_study.service.jobs.submission import accept
+        from sprag_study.service.spec.document import parse_spec
+        from sprag_study.service.spec.report import SpecError
+        from sprag_study.service.spec.stored import accepted
 
         if not self._may_overlap(run):
             return
@@ -197,7 +197,7 @@ def _actor(schedule_id: str, owner: str | None = None) -> Actor:
 
 def _finish_of(run: OpenRun) -> datetime | None:
     """The deadline of a run; None where it has none."""
-    from sprag.service.schedules.deadline import run_finish_at
+    from sprag_study.service.schedules.deadline import run_finish_at
 
     text = run.fields.finish_by
     return None if text is None else run_finish_at(text, run.fields.timing.zone, run.begun_at)

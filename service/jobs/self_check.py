@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 
-from sprag.worker.models import MACHINE_SHAFT, OK, run_chunk, study_results
-from sprag.worker.study import Study
+from sprag_study.worker.models import MACHINE_SHAFT, OK, run_chunk, study_results
+from sprag_study.worker.study import Study
 
 #: Largest acceptable relative difference.
 TOLERANCE = 1e-8

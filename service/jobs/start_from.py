@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from sprag.sentences import Sentence
-from sprag.service.reading.limits import span
-from sprag.service.spec.machine.drive import START, START_AT
-from sprag.service.spec.machine.shaft_check import NotCompiledError, compiles_here
-from sprag.service.spec.node import Node
-from sprag.service.spec.report import Report
-from sprag.service.storage.errors import StudyNotFoundError
-from sprag.worker import models
-from sprag.worker.limits import MAX_CASES, MAX_STARTS
-from sprag.worker.models.starts import count_of, motion_of
+from sprag_study.sentences import Sentence
+from sprag_study.service.reading.limits import span
+from sprag_study.service.spec.machine.drive import START, START_AT
+from sprag_study.service.spec.machine.shaft_check import NotCompiledError, compiles_here
+from sprag_study.service.spec.node import Node
+from sprag_study.service.spec.report import Report
+from sprag_study.service.storage.errors import StudyNotFoundError
+from sprag_study.worker import models
+from sprag_study.worker.limits import MAX_CASES, MAX_STARTS
+from sprag_study.worker.models.starts import count_of, motion_of
 
 if TYPE_CHECKING:
-    from sprag.service.storage.store import Store
-    from sprag.worker.study import Study
+    from sprag_study.service.storage.store import Store
+    from sprag_study.worker.study import Study
 
 _POINTER = f"/base/{START}"
 

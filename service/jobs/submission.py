@@ -7,24 +7,24 @@ import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from sprag.sentences import Amount, Sentence
-from sprag.service.faults import FaultError
-from sprag.service.jobs.preview import estimated_bytes, estimated_seconds
-from sprag.service.languages import recorded
-from sprag.service.schedules.deadline import finish_warnings
-from sprag.service.storage.studies.study_row import study_row
-from sprag.service.storage.work.room import RESERVE_BYTES
-from sprag.worker.limits import MAX_WAITING_STUDIES
-from sprag.worker.planning import most_cases
+from sprag_study.sentences import Amount, Sentence
+from sprag_study.service.faults import FaultError
+from sprag_study.service.jobs.preview import estimated_bytes, estimated_seconds
+from sprag_study.service.languages import recorded
+from sprag_study.service.schedules.deadline import finish_warnings
+from sprag_study.service.storage.studies.study_row import study_row
+from sprag_study.service.storage.work.room import RESERVE_BYTES
+from sprag_study.worker.limits import MAX_WAITING_STUDIES
+from sprag_study.worker.planning import most_cases
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from datetime import datetime
 
-    from sprag.service.spec.document import ParsedSpec
-    from sprag.service.storage.schedules.runs import OpenRun
-    from sprag.service.storage.store import Store
-    from sprag.service.storage.studies.records import StudyRecord
+    from sprag_study.service.spec.document import ParsedSpec
+    from sprag_study.service.storage.schedules.runs import OpenRun
+    from sprag_study.service.storage.store import Store
+    from sprag_study.service.storage.studies.records import StudyRecord
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class Submission:
     Attributes
     ----------
     row : dict
-        See `sprag.service.storage.studies.study_row`.
+        See `sprag_study.service.storage.studies.study_row`.
     body_hash : str
         Hash of the spec and the parameters of the request, for the idempotency key.
     bytes : int

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.json_text import timestamp
+from sprag_study.service.json_text import timestamp
 
 if TYPE_CHECKING:
-    from sprag.service.answers.workers import Dispatcher, WorkerList
-    from sprag.service.storage.studies.records import DispatcherRecord
-    from sprag.service.storage.work.dispatchers import Dispatchers
+    from sprag_study.service.answers.workers import Dispatcher, WorkerList
+    from sprag_study.service.storage.studies.records import DispatcherRecord
+    from sprag_study.service.storage.work.dispatchers import Dispatchers
 
 
 def worker_list(dispatchers: Dispatchers) -> WorkerList:

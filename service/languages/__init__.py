@@ -15,7 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
-from sprag.service.languages.catalogue import Catalogue, read
+from sprag_study.service.languages.catalogue import Catalogue, read
 
 ENGLISH: Final = "en"
 FOLDER: Final = Path(__file__).parent

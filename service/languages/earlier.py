@@ -1,7 +1,7 @@
 """Sentences that came in English only, in the language of whoever reads them: their texts are found again.
 
 Earlier releases stored reasons so, and a service tells them so to programs. What is stored now keeps its values
-(`sprag.sentences`). A text that is not found stays English.
+(`sprag_study.sentences`). A text that is not found stays English.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ import re
 from functools import cache
 from typing import Final
 
-from sprag.sentences import Clause, Part, Sentence
-from sprag.service.languages import ENGLISH, N_, current, gettext
-from sprag.service.languages.recorded import (
+from sprag_study.sentences import Clause, Part, Sentence
+from sprag_study.service.languages import ENGLISH, N_, current, gettext
+from sprag_study.service.languages.recorded import (
     COPY,
     DELETED,
     DISK,
@@ -49,7 +49,7 @@ from sprag.service.languages.recorded import (
     WINDOW,
 )
 
-#: What workers write (`sprag.worker`), which has no languages.
+#: What workers write (`sprag_study.worker`), which has no languages.
 _OF_WORKERS: Final = (
     N_("no pass of {total} is complete"),
     N_("pass {complete} of {total} is complete, a grid of {values} values"),

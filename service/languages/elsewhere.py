@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, TypeVar, TypeVarTuple
 
-from sprag.service import languages
+from sprag_study.service import languages
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -1,14 +1,14 @@
 """Texts of sentences that are stored, such as the reason of a hold.
 
-What is stored keeps its text beside its values (`sprag.sentences`). A text whose wording changes stays here, marked for
-the catalogues, for what is stored.
+What is stored keeps its text beside its values (`sprag_study.sentences`). A text whose wording changes stays here,
+marked for the catalogues, for what is stored.
 """
 
 from __future__ import annotations
 
 from typing import Final
 
-from sprag.service.languages import N_
+from sprag_study.service.languages import N_
 
 OUTSIDE_WINDOW: Final = N_("outside its window, {window}; it continues by itself")
 WINDOW: Final = N_("{begin} to {end} ({zone})")

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.sentences import Amount, Sentence, joined
-from sprag.service.reading.texts import did_you_mean
-from sprag.worker.models import Parameter, ResultInfo
-from sprag.worker.models.parameters import parameter_of, placed
+from sprag_study.sentences import Amount, Sentence, joined
+from sprag_study.service.reading.texts import did_you_mean
+from sprag_study.worker.models import Parameter, ResultInfo
+from sprag_study.worker.models.parameters import parameter_of, placed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.answers.studies import AxisInfo
-    from sprag.worker.study import Axis, Study
+    from sprag_study.service.answers.studies import AxisInfo
+    from sprag_study.worker.study import Axis, Study
 
 
 def unit_of(study: Study, path: str) -> str:

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.reading.catalogue import unit_of
-from sprag.worker import models
-from sprag.worker.directions import SWEEP, direction
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.worker import models
+from sprag_study.worker.directions import SWEEP, direction
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from sprag.service.answers import Value
-    from sprag.service.answers.studies import AxisInfo
-    from sprag.worker.study import Study
+    from sprag_study.service.answers import Value
+    from sprag_study.service.answers.studies import AxisInfo
+    from sprag_study.worker.study import Study
 
 
 def in_words(values: Mapping[str, float]) -> dict[str, Value]:

@@ -1,7 +1,7 @@
 """Faults in the reader's language.
 
 What a fault says is a sentence with its values, or a text of the catalogue. One that is neither is told by the meaning
-of its code (`sprag.service.fault_meanings`).
+of its code (`sprag_study.service.fault_meanings`).
 """
 
 from __future__ import annotations
@@ -9,16 +9,16 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from sprag.sentences import Sentence
-from sprag.service.fault_meanings import MEANINGS
-from sprag.service.languages import ENGLISH, current, gettext
-from sprag.service.reading.quantities import Units
-from sprag.service.reading.reader import said
-from sprag.service.reading.wording import unit_text
+from sprag_study.sentences import Sentence
+from sprag_study.service.fault_meanings import MEANINGS
+from sprag_study.service.languages import ENGLISH, current, gettext
+from sprag_study.service.reading.quantities import Units
+from sprag_study.service.reading.reader import said
+from sprag_study.service.reading.wording import unit_text
 
 if TYPE_CHECKING:
-    from sprag.service.faults import Fault
-    from sprag.service.reading.reader import Reading
+    from sprag_study.service.faults import Fault
+    from sprag_study.service.reading.reader import Reading
 
 
 def fault_text(fault: Fault, reading: Reading | None = None) -> str:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag.sentences import Sentence, Typed, joined, plural
+from sprag_study.sentences import Sentence, Typed, joined, plural
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from sprag.sentences import Part
+    from sprag_study.sentences import Part
 
 
 def span(low: Part, high: Part) -> Sentence:

@@ -11,9 +11,9 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
-from sprag.sentences import Amount, Sentence, Typed, joined
-from sprag.service.languages import N_, decimal
-from sprag.service.reading.printed import keyboard
+from sprag_study.sentences import Amount, Sentence, Typed, joined
+from sprag_study.service.languages import N_, decimal
+from sprag_study.service.reading.printed import keyboard
 
 #: A number at the beginning of a text: its digits with all their points and commas, and whether an exponent follows.
 _NUMBER: Final = re.compile(r"\s*[+\-\u2212]?([.,]?[0-9][0-9.,]*)([eE][+\-\u2212]?[0-9])?")

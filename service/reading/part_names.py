@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from sprag.service.languages import N_, _, gettext
-from sprag.service.reading.wording import words
+from sprag_study.service.languages import N_, _, gettext
+from sprag_study.service.reading.wording import words
 
 #: What parts of a machine are called that have a number.
 NUMBERED: Final = {

@@ -16,17 +16,17 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.sentences import Sentence
-from sprag.service.faults import refused
-from sprag.service.reading.catalogue import result_of, unit_of
-from sprag.service.reading.cyrillic import latin
-from sprag.service.reading.units import QuantityError, parse_quantity, plain_signs, split_quantity
-from sprag.worker import models
+from sprag_study.sentences import Sentence
+from sprag_study.service.faults import refused
+from sprag_study.service.reading.catalogue import result_of, unit_of
+from sprag_study.service.reading.cyrillic import latin
+from sprag_study.service.reading.units import QuantityError, parse_quantity, plain_signs, split_quantity
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
 SI: Final = "si"
 TYPED: Final = "typed"

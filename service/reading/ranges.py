@@ -6,8 +6,8 @@ import re
 from dataclasses import dataclass
 from typing import Final
 
-from sprag.service.reading.together import with_unit_of_range
-from sprag.service.reading.units import QuantityError, split_typed
+from sprag_study.service.reading.together import with_unit_of_range
+from sprag_study.service.reading.units import QuantityError, split_typed
 
 #: Between the ends: dots, a dash, or a word; a hyphen counts between digits only, where it is no sign of an exponent.
 _BETWEEN: Final = r"(?:\s*(?:\.{2,3}|…)\s*|\s+(?:to|up to|до)\s+|\s*[–—]\s*|\s+-\s+|(?<=[0-9])-(?=[0-9]))"

@@ -13,20 +13,20 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 from markupsafe import Markup
 
-from sprag.sentences import Amount, Clause, Name, Part, Place, Sentence, Typed, WarningText, Whole, filled, whole
-from sprag.service.fault_meanings import WARNING_MEANINGS
-from sprag.service.faults import refused
-from sprag.service.languages import ENGLISH, _, current, decimal, earlier, gettext, language, ngettext
-from sprag.service.reading.numbers import in_language
-from sprag.service.reading.part_names import lower_first, part_name, run_name, upper_first
-from sprag.service.reading.quantities import KINDS, SI, Units, units_for
-from sprag.service.reading.units import has_unit
-from sprag.service.reading.wording import number, unit_text
-from sprag.worker.models.registry import model_of
-from sprag.worker.models.vocabulary import caption, has_caption, letter
+from sprag_study.sentences import Amount, Clause, Name, Part, Place, Sentence, Typed, WarningText, Whole, filled, whole
+from sprag_study.service.fault_meanings import WARNING_MEANINGS
+from sprag_study.service.faults import refused
+from sprag_study.service.languages import ENGLISH, _, current, decimal, earlier, gettext, language, ngettext
+from sprag_study.service.reading.numbers import in_language
+from sprag_study.service.reading.part_names import lower_first, part_name, run_name, upper_first
+from sprag_study.service.reading.quantities import KINDS, SI, Units, units_for
+from sprag_study.service.reading.units import has_unit
+from sprag_study.service.reading.wording import number, unit_text
+from sprag_study.worker.models.registry import model_of
+from sprag_study.worker.models.vocabulary import caption, has_caption, letter
 
 if TYPE_CHECKING:
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
 
 class Phrase(Sentence):

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from sprag.sentences import Sentence
+from sprag_study.sentences import Sentence
 
 _LONGEST_TEXT = 60
 _LONGEST_LIST = 6

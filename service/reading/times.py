@@ -6,7 +6,7 @@ from datetime import datetime, timedelta
 from typing import Final
 from zoneinfo import ZoneInfo
 
-from sprag.service.languages import N_, date_format, gettext, pgettext
+from sprag_study.service.languages import N_, date_format, gettext, pgettext
 
 #: Days for which the day of the week says enough.
 _WEEK: Final = 6

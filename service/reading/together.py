@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Final
 
-from sprag.sentences import Sentence, Typed, joined
-from sprag.service.faults import Code
-from sprag.service.reading.cyrillic import latin
-from sprag.service.reading.units import PERCENT, PERIOD_NAMES, QuantityError, measure, parse_exact, split_typed
+from sprag_study.sentences import Sentence, Typed, joined
+from sprag_study.service.faults import Code
+from sprag_study.service.reading.cyrillic import latin
+from sprag_study.service.reading.units import PERCENT, PERIOD_NAMES, QuantityError, measure, parse_exact, split_typed
 
 #: Code of a bare number that could be in several units.
 AMBIGUOUS_UNIT: Final[Code] = "ambiguous-unit"

@@ -11,8 +11,8 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import Final
 
-from sprag.sentences import Sentence
-from sprag.service.languages import N_
+from sprag_study.sentences import Sentence
+from sprag_study.service.languages import N_
 
 #: Twice pi to 50 digits, so that its rounding never affects a double.
 TWO_PI: Final = "6.2831853071795864769252867665590057683943387987502"

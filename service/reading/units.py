@@ -20,14 +20,14 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
-from sprag.sentences import Amount, Sentence, Typed, joined, plural
-from sprag.service.faults import Code
-from sprag.service.languages import N_
-from sprag.service.reading.cyrillic import latin
-from sprag.service.reading.numbers import is_ambiguous, with_point
-from sprag.service.reading.printed import keyboard
-from sprag.service.reading.unit_names import DEFINITIONS, TWO_PI, refusal, resolved
-from sprag.worker.limits import MAX_QUANTITY_LENGTH
+from sprag_study.sentences import Amount, Sentence, Typed, joined, plural
+from sprag_study.service.faults import Code
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.cyrillic import latin
+from sprag_study.service.reading.numbers import is_ambiguous, with_point
+from sprag_study.service.reading.printed import keyboard
+from sprag_study.service.reading.unit_names import DEFINITIONS, TWO_PI, refusal, resolved
+from sprag_study.worker.limits import MAX_QUANTITY_LENGTH
 
 if TYPE_CHECKING:
     import pint

@@ -8,9 +8,9 @@ from typing import Final
 
 from markupsafe import Markup
 
-from sprag.service.languages import ENGLISH, N_, current, decimal, gettext, grouped, ngettext, pgettext
-from sprag.worker import models
-from sprag.worker.models.vocabulary import words
+from sprag_study.service.languages import ENGLISH, N_, current, decimal, gettext, grouped, ngettext, pgettext
+from sprag_study.worker import models
+from sprag_study.worker.models.vocabulary import words
 
 __all__ = ["counted", "duration", "number", "percent", "symbol", "typed_text", "unit_text", "words"]
 

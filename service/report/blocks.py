@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
-from sprag.sentences import Amount, Name, Sentence
+from sprag_study.sentences import Amount, Name, Sentence
 
 if TYPE_CHECKING:
-    from sprag.service.reading.reader import Reading
+    from sprag_study.service.reading.reader import Reading
 
 #: A text or a number that is printed in the language and units of a reader.
 Words = str | Amount | Name

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag.sentences import Amount, Name
-from sprag.service.figures.calibration import calibration_figure
-from sprag.service.languages import _
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.reader import Phrase, joined
-from sprag.service.report.drives import DrivesPart
+from sprag_study.sentences import Amount, Name
+from sprag_study.service.figures.calibration import calibration_figure
+from sprag_study.service.languages import _
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.reader import Phrase, joined
+from sprag_study.service.report.drives import DrivesPart
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from sprag.service.results.calibration import Calibration
+    from sprag_study.service.results.calibration import Calibration
 
 
 def calibration_part(found: Calibration) -> DrivesPart:

@@ -9,37 +9,37 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
-from sprag.sentences import Place
-from sprag.service.exports.inputs import Input
-from sprag.service.figures.answers import answers_figure
-from sprag.service.figures.curves import curves_figure
-from sprag.service.figures.drawings import drawings
-from sprag.service.figures.pictures import draw_sensitivity
-from sprag.service.languages import N_, _, gettext
-from sprag.service.reading.catalogue import axes_json
-from sprag.service.reading.directions import ends_in_words
-from sprag.service.reading.part_names import lower_first, upper_first
-from sprag.service.reading.reader import CODES, shown, term, titled
-from sprag.service.reading.wording import number, unit_text, words
-from sprag.service.report.blocks import Block, Image, Section, Table, Text
-from sprag.service.report.drawn import chosen_image, drawing_images, image, map_images
-from sprag.service.report.facts import facts_of
-from sprag.service.results.defaults import caption, varying_axes
-from sprag.service.results.fronts import goal_units
-from sprag.service.results.key_answer_words import answer_facts, curve_name, note_of, said_title
-from sprag.service.results.refined_maps import map_plan
-from sprag.service.results.regimes import counted, left_out
-from sprag.service.results.rounds import sentence
-from sprag.service.results.shown_inputs import choice_name, in_words, run_settings
-from sprag.service.results.varied import formula_in_words, formula_text, in_captions, tolerances_of, values_text
-from sprag.service.views.study_questions import CHAPTERS
-from sprag.worker import models
-from sprag.worker.planning.calibrate.plan import CALIBRATE
+from sprag_study.sentences import Place
+from sprag_study.service.exports.inputs import Input
+from sprag_study.service.figures.answers import answers_figure
+from sprag_study.service.figures.curves import curves_figure
+from sprag_study.service.figures.drawings import drawings
+from sprag_study.service.figures.pictures import draw_sensitivity
+from sprag_study.service.languages import N_, _, gettext
+from sprag_study.service.reading.catalogue import axes_json
+from sprag_study.service.reading.directions import ends_in_words
+from sprag_study.service.reading.part_names import lower_first, upper_first
+from sprag_study.service.reading.reader import CODES, shown, term, titled
+from sprag_study.service.reading.wording import number, unit_text, words
+from sprag_study.service.report.blocks import Block, Image, Section, Table, Text
+from sprag_study.service.report.drawn import chosen_image, drawing_images, image, map_images
+from sprag_study.service.report.facts import facts_of
+from sprag_study.service.results.defaults import caption, varying_axes
+from sprag_study.service.results.fronts import goal_units
+from sprag_study.service.results.key_answer_words import answer_facts, curve_name, note_of, said_title
+from sprag_study.service.results.refined_maps import map_plan
+from sprag_study.service.results.regimes import counted, left_out
+from sprag_study.service.results.rounds import sentence
+from sprag_study.service.results.shown_inputs import choice_name, in_words, run_settings
+from sprag_study.service.results.varied import formula_in_words, formula_text, in_captions, tolerances_of, values_text
+from sprag_study.service.views.study_questions import CHAPTERS
+from sprag_study.worker import models
+from sprag_study.worker.planning.calibrate.plan import CALIBRATE
 
 if TYPE_CHECKING:
-    from sprag.service.report.content import Report
-    from sprag.service.report.office import Office
-    from sprag.service.results.key_answers import Found
+    from sprag_study.service.report.content import Report
+    from sprag_study.service.report.office import Office
+    from sprag_study.service.results.key_answers import Found
 
 Write = Callable[["Report"], Iterator[Block]]
 

@@ -5,26 +5,26 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.faults import SelectionError, refused
-from sprag.service.figures.curves import curves_figure
-from sprag.service.figures.pictures import MAX_PICTURE_POINTS, check_size, draw_figure, draw_map, require_drawable
-from sprag.service.figures.read import read_figure, read_map
-from sprag.service.languages import _
-from sprag.service.reading.part_names import lower_first
-from sprag.service.reading.reader import Choice, reading_for
-from sprag.service.results.choice import Address, MapQuery, curve_query, map_query
-from sprag.service.results.curve_cases import select
-from sprag.service.results.curves import CurveQuery, Map
-from sprag.service.results.defaults import caption, drawn_numbers
-from sprag.service.results.stored_curves import drawn_curves, stored_map
-from sprag.worker import models
+from sprag_study.service.faults import SelectionError, refused
+from sprag_study.service.figures.curves import curves_figure
+from sprag_study.service.figures.pictures import MAX_PICTURE_POINTS, check_size, draw_figure, draw_map, require_drawable
+from sprag_study.service.figures.read import read_figure, read_map
+from sprag_study.service.languages import _
+from sprag_study.service.reading.part_names import lower_first
+from sprag_study.service.reading.reader import Choice, reading_for
+from sprag_study.service.results.choice import Address, MapQuery, curve_query, map_query
+from sprag_study.service.results.curve_cases import select
+from sprag_study.service.results.curves import CurveQuery, Map
+from sprag_study.service.results.defaults import caption, drawn_numbers
+from sprag_study.service.results.stored_curves import drawn_curves, stored_map
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
-    from sprag.service.figures.figure import Figure
-    from sprag.service.figures.pictures import Picture
-    from sprag.service.spec.saved_views import View
-    from sprag.service.storage.store import Store
-    from sprag.worker.study import Study
+    from sprag_study.service.figures.figure import Figure
+    from sprag_study.service.figures.pictures import Picture
+    from sprag_study.service.spec.saved_views import View
+    from sprag_study.service.storage.store import Store
+    from sprag_study.worker.study import Study
 
 CONTOUR: Final = "contour"
 #: Panels in a row of curves, as on their page.

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from sprag.sentences import Amount
-from sprag.service.languages import _
-from sprag.service.reading.catalogue import axes_json
-from sprag.service.reading.reader import Phrase, joined, plural
-from sprag.service.report.blocks import Section, Table, Text
-from sprag.service.results.asked import goals_of, limits_of
-from sprag.service.results.varied import ends, formula_text, varied, with_distribution, with_tolerance
+from sprag_study.sentences import Amount
+from sprag_study.service.languages import _
+from sprag_study.service.reading.catalogue import axes_json
+from sprag_study.service.reading.reader import Phrase, joined, plural
+from sprag_study.service.report.blocks import Section, Table, Text
+from sprag_study.service.results.asked import goals_of, limits_of
+from sprag_study.service.results.varied import ends, formula_text, varied, with_distribution, with_tolerance
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from sprag.service.exports.inputs import Input
-    from sprag.service.report.blocks import Words
-    from sprag.service.report.content import Report
+    from sprag_study.service.exports.inputs import Input
+    from sprag_study.service.report.blocks import Words
+    from sprag_study.service.report.content import Report
 
 #: Most rows of both columns together.
 _ROWS: Final = 26

@@ -10,48 +10,48 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.exports.inputs import Input, inputs
-from sprag.service.exports.source import StoredRows, given_texts
-from sprag.service.faults import SelectionError
-from sprag.service.figures.clutch import clutch_figure
-from sprag.service.figures.pictures import MOST_RESULTS, require_drawable
-from sprag.service.languages import _
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.directions import case_values
-from sprag.service.reading.quantities import TYPED
-from sprag.service.reading.reader import Choice, Reading, model_title, reading_for
-from sprag.service.report.calibration import calibration_part
-from sprag.service.report.chosen_figures import ChosenFigure, chosen_figures
-from sprag.service.report.drives import DrivesPart, drives_part
-from sprag.service.results.curve_cases import draw, draw_map, select
-from sprag.service.results.curves import Curves, Map
-from sprag.service.results.defaults import drawn_results, main_query, no_curves, varying_axes
-from sprag.service.results.key_answer_words import curve_name, curve_named
-from sprag.service.results.key_answers import answers_query, find_answers, usual_curve
-from sprag.service.results.refined import curve_plan
-from sprag.service.results.refined_maps import map_plan
-from sprag.service.results.sensitivity import Sensitivity, sensitivity
-from sprag.service.results.varied import names_in_files
-from sprag.service.views.curves import completed_query
-from sprag.service.views.headline import headline_of
-from sprag.service.views.study_questions import ReportQuestion
-from sprag.worker import models
-from sprag.worker.planning.calibrate.plan import CALIBRATE
-from sprag.worker.planning.goals.plan import GOAL
+from sprag_study.service.exports.inputs import Input, inputs
+from sprag_study.service.exports.source import StoredRows, given_texts
+from sprag_study.service.faults import SelectionError
+from sprag_study.service.figures.clutch import clutch_figure
+from sprag_study.service.figures.pictures import MOST_RESULTS, require_drawable
+from sprag_study.service.languages import _
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.directions import case_values
+from sprag_study.service.reading.quantities import TYPED
+from sprag_study.service.reading.reader import Choice, Reading, model_title, reading_for
+from sprag_study.service.report.calibration import calibration_part
+from sprag_study.service.report.chosen_figures import ChosenFigure, chosen_figures
+from sprag_study.service.report.drives import DrivesPart, drives_part
+from sprag_study.service.results.curve_cases import draw, draw_map, select
+from sprag_study.service.results.curves import Curves, Map
+from sprag_study.service.results.defaults import drawn_results, main_query, no_curves, varying_axes
+from sprag_study.service.results.key_answer_words import curve_name, curve_named
+from sprag_study.service.results.key_answers import answers_query, find_answers, usual_curve
+from sprag_study.service.results.refined import curve_plan
+from sprag_study.service.results.refined_maps import map_plan
+from sprag_study.service.results.sensitivity import Sensitivity, sensitivity
+from sprag_study.service.results.varied import names_in_files
+from sprag_study.service.views.curves import completed_query
+from sprag_study.service.views.headline import headline_of
+from sprag_study.service.views.study_questions import ReportQuestion
+from sprag_study.worker import models
+from sprag_study.worker.planning.calibrate.plan import CALIBRATE
+from sprag_study.worker.planning.goals.plan import GOAL
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.figures.figure import Figure
-    from sprag.service.results.calibration import Calibration
-    from sprag.service.results.curves import CurveQuery, Fetch
-    from sprag.service.results.fronts import Designs
-    from sprag.service.results.key_answers import StudyAnswers
-    from sprag.service.storage.studies.records import Kinds, RowBlock
-    from sprag.service.views.headline import Headline
-    from sprag.service.views.library import Library
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.study import Study
+    from sprag_study.service.figures.figure import Figure
+    from sprag_study.service.results.calibration import Calibration
+    from sprag_study.service.results.curves import CurveQuery, Fetch
+    from sprag_study.service.results.fronts import Designs
+    from sprag_study.service.results.key_answers import StudyAnswers
+    from sprag_study.service.storage.studies.records import Kinds, RowBlock
+    from sprag_study.service.views.headline import Headline
+    from sprag_study.service.views.library import Library
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.study import Study
 
 #: Half widths of means appear in the table beside their means.
 _HALF_WIDTH: Final = ".half_width"
@@ -264,7 +264,7 @@ def _shortened(text: str) -> str:
 def ranges(model: str, infos: Sequence[ResultInfo], blocks: Iterable[RowBlock]) -> tuple[Range, ...]:
     """Least, mean and largest of every result over the rows, with the first case that has the extreme.
 
-    Rows that are not usable (`sprag.worker.models.usable`) are left out: a case that failed keeps what could be
+    Rows that are not usable (`sprag_study.worker.models.usable`) are left out: a case that failed keeps what could be
     computed, and that of an unstable motion is not the machine's.
     """
     columns = [index for index, info in enumerate(infos) if info.kind != "category"]

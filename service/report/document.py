@@ -5,22 +5,22 @@ from __future__ import annotations
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.faults import choice_of, refused
-from sprag.service.languages import _, pgettext
-from sprag.service.reading.limits import characters
-from sprag.service.report.blocks import Block, Document, Section, Text, said
-from sprag.service.report.chapters import appendix, further_figures
-from sprag.service.report.content import AS_TYPED, Report
-from sprag.service.report.office import Office
-from sprag.service.report.sheets import sheets
-from sprag.service.views.study_questions import CHAPTERS, ReportQuestion
+from sprag_study.service.faults import choice_of, refused
+from sprag_study.service.languages import _, pgettext
+from sprag_study.service.reading.limits import characters
+from sprag_study.service.report.blocks import Block, Document, Section, Text, said
+from sprag_study.service.report.chapters import appendix, further_figures
+from sprag_study.service.report.content import AS_TYPED, Report
+from sprag_study.service.report.office import Office
+from sprag_study.service.report.sheets import sheets
+from sprag_study.service.views.study_questions import CHAPTERS, ReportQuestion
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from datetime import datetime
 
-    from sprag.service.reading.reader import Choice
-    from sprag.service.views.library import Library
+    from sprag_study.service.reading.reader import Choice
+    from sprag_study.service.views.library import Library
 
 #: Most characters of a text of the author.
 LONGEST_TEXT: Final = 2_000
@@ -63,7 +63,7 @@ def made_document(report: Report, office: Office = NOBODY, *, edited: bool = Fal
         report.title,
         tuple(title_block(report.question, office)),
         tuple(section for section in kept if section.blocks),
-        _("computed by Sprag {version}, {time}", version=version("sprag"), time=office.moment(_computed(report))),
+        _("computed by Sprag {version}, {time}", version=version("sprag-study"), time=office.moment(_computed(report))),
     )
 
 

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag.service.figures.drawing import svg as drawing_svg
-from sprag.service.figures.drawings import drawings
-from sprag.service.figures.read import read_figure, read_map
-from sprag.service.figures.svg import DOUBLE, WIDE, as_file, svg
-from sprag.service.figures.svg_map import map_svg
-from sprag.service.languages import _
-from sprag.service.reading.part_names import lower_first
-from sprag.service.report.blocks import Block, Image, Text, said
-from sprag.service.report.conditions import values_of
-from sprag.service.results.curves import Map
+from sprag_study.service.figures.drawing import svg as drawing_svg
+from sprag_study.service.figures.drawings import drawings
+from sprag_study.service.figures.read import read_figure, read_map
+from sprag_study.service.figures.svg import DOUBLE, WIDE, as_file, svg
+from sprag_study.service.figures.svg_map import map_svg
+from sprag_study.service.languages import _
+from sprag_study.service.reading.part_names import lower_first
+from sprag_study.service.report.blocks import Block, Image, Text, said
+from sprag_study.service.report.conditions import values_of
+from sprag_study.service.results.curves import Map
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from sprag.service.figures.figure import Figure
-    from sprag.service.report.chosen_figures import ChosenFigure
-    from sprag.service.report.content import Report
+    from sprag_study.service.figures.figure import Figure
+    from sprag_study.service.report.chosen_figures import ChosenFigure
+    from sprag_study.service.report.content import Report
 
 
 def image(report: Report, figure: Figure, caption: str) -> Image:

@@ -6,23 +6,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.faults import SelectionError
-from sprag.service.figures.ribbons import ribbon_figure
-from sprag.service.languages import _
-from sprag.service.reading.reader import Phrase, joined, plural
-from sprag.service.results.defaults import drawn_results
-from sprag.service.results.headlines.along import judged_by
-from sprag.service.results.tolerances.batch import Asked
-from sprag.service.results.tolerances.conditions import first_condition
-from sprag.service.results.tolerances.ribbons import QUANTILES, ribbon
-from sprag.service.results.tolerances.told import at_line, causes_sentences, worst_sentences, yield_sentence
-from sprag.service.results.tolerances.yields import yields
+from sprag_study.service.faults import SelectionError
+from sprag_study.service.figures.ribbons import ribbon_figure
+from sprag_study.service.languages import _
+from sprag_study.service.reading.reader import Phrase, joined, plural
+from sprag_study.service.results.defaults import drawn_results
+from sprag_study.service.results.headlines.along import judged_by
+from sprag_study.service.results.tolerances.batch import Asked
+from sprag_study.service.results.tolerances.conditions import first_condition
+from sprag_study.service.results.tolerances.ribbons import QUANTILES, ribbon
+from sprag_study.service.results.tolerances.told import at_line, causes_sentences, worst_sentences, yield_sentence
+from sprag_study.service.results.tolerances.yields import yields
 
 if TYPE_CHECKING:
-    from sprag.service.figures.figure import Figure
-    from sprag.service.results.curves import Fetch
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.study import Study
+    from sprag_study.service.figures.figure import Figure
+    from sprag_study.service.results.curves import Fetch
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.study import Study
 
 #: Drives in the list of the worst ones.
 _WORST: Final = 5

@@ -8,14 +8,14 @@ from collections.abc import Mapping
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.languages import _
-from sprag.service.reading.reader import model_title
-from sprag.service.reading.wording import number
+from sprag_study.service.languages import _
+from sprag_study.service.reading.reader import model_title
+from sprag_study.service.reading.wording import number
 
 if TYPE_CHECKING:
-    from sprag.service.report.office import Office
-    from sprag.service.storage.studies.records import StudyRecord
-    from sprag.worker.study import Study
+    from sprag_study.service.report.office import Office
+    from sprag_study.service.storage.studies.records import StudyRecord
+    from sprag_study.worker.study import Study
 
 
 def facts_of(record: StudyRecord, study: Study, spec: Mapping[str, Any], office: Office) -> tuple[tuple[str, str], ...]:
@@ -30,7 +30,7 @@ def facts_of(record: StudyRecord, study: Study, spec: Mapping[str, Any], office:
         (_("axes"), _combined(study)),
         (_("submitted"), office.moment(record.created_at)),
         (_("ended"), _("not yet") if ended is None else office.moment(ended)),
-        (_("version of Sprag"), version("sprag")),
+        (_("version of Sprag"), version("sprag-study")),
         (_("engine"), record.engine_version),
         (_("hash of the physics"), record.physics_hash),
         (_("SHA-256 of the spec"), spec_hash(spec)),

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING
 from jinja2 import ChoiceLoader, Environment, FileSystemLoader, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from sprag.service.languages import _, current
+from sprag_study.service.languages import _, current
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from sprag.service.report.blocks import Document
+    from sprag_study.service.report.blocks import Document
 
 
 def html_report(document: Document, folder: Path | None, logo: tuple[str, bytes] | None) -> bytes:
     """The page. ``folder`` may have a template of the office's own; ``logo`` is a media type and a picture."""
-    package = PackageLoader("sprag.service.report")
+    package = PackageLoader("sprag_study.service.report")
     environment = Environment(
         loader=package if folder is None else ChoiceLoader([FileSystemLoader(folder), package]),
         autoescape=True,
@@ -40,7 +40,7 @@ def html_report(document: Document, folder: Path | None, logo: tuple[str, bytes]
 @cache
 def style() -> Markup:
     """The style of the sheets, which the page of a document has as a file."""
-    return Markup((files("sprag.service.report") / "static" / "document.css").read_text("utf-8"))  # noqa: S704 - ours
+    return Markup((files("sprag_study.service.report") / "static" / "document.css").read_text("utf-8"))  # noqa: S704 - ours
 
 
 def sheet_of(number: int, count: int) -> str:

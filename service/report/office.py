@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, Self
 from zoneinfo import ZoneInfo
 
-from sprag.service.languages import date_format
+from sprag_study.service.languages import date_format
 
 if TYPE_CHECKING:
-    from sprag.service.settings import Settings
+    from sprag_study.service.settings import Settings
 
 #: Files that may be the logo, and their media types.
 _LOGOS: Final = (("logo.svg", "image/svg+xml"), ("logo.png", "image/png"))

@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from sprag.service.report.chapters import chapters_of
-from sprag.service.report.document import made_document, report_of
+from sprag_study.service.report.chapters import chapters_of
+from sprag_study.service.report.document import made_document, report_of
 
 if TYPE_CHECKING:
-    from sprag.service.reading.reader import Choice
-    from sprag.service.report.blocks import Document
-    from sprag.service.report.office import Office
-    from sprag.service.views.library import Library
-    from sprag.service.views.study_questions import ReportQuestion
+    from sprag_study.service.reading.reader import Choice
+    from sprag_study.service.report.blocks import Document
+    from sprag_study.service.report.office import Office
+    from sprag_study.service.views.library import Library
+    from sprag_study.service.views.study_questions import ReportQuestion
 
 
 @dataclass(frozen=True, slots=True)

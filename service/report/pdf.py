@@ -13,14 +13,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Final, cast
 
-from sprag.service.extras import naming_extra
-from sprag.service.faults import FaultError
-from sprag.service.languages import _, current
-from sprag.service.report.blocks import Document, Image, Section
-from sprag.service.report.html import page_numbers, sheet_of
+from sprag_study.service.extras import naming_extra
+from sprag_study.service.faults import FaultError
+from sprag_study.service.languages import _, current
+from sprag_study.service.report.blocks import Document, Image, Section
+from sprag_study.service.report.html import page_numbers, sheet_of
 
 if TYPE_CHECKING:
-    from sprag.service.report.blocks import Block
+    from sprag_study.service.report.blocks import Block
 
 TEMPLATE: Final = "report.typ"
 #: The conformance asked for: PDF for everybody, with tags, a title, a language and descriptions of pictures.
@@ -47,7 +47,7 @@ def pdf_report(document: Document, folder: Path | None, logo: tuple[str, bytes] 
         if own is not None and own.is_file():
             shutil.copytree(own.parent, place, dirs_exist_ok=True)
         else:
-            with as_file(files("sprag.service.report") / "templates" / TEMPLATE) as template:
+            with as_file(files("sprag_study.service.report") / "templates" / TEMPLATE) as template:
                 shutil.copy(template, place / TEMPLATE)
         data: dict[str, Any] = {
             "title": document.title,

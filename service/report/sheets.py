@@ -13,27 +13,27 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import Amount, Name
-from sprag.service.figures.answers import answers_figure
-from sprag.service.figures.front import NUMBER, front_figure, quantities
-from sprag.service.figures.orders import motion_name, motion_text
-from sprag.service.languages import _
-from sprag.service.reading.part_names import upper_first
-from sprag.service.reading.reader import Phrase, joined, plural
-from sprag.service.report.blocks import Block, Section, Table, Text
-from sprag.service.report.conditions import conditions
-from sprag.service.report.content import varies
-from sprag.service.report.drawn import chosen_image, drawing_images, image, map_images
-from sprag.service.report.trust import trust
-from sprag.service.results.defaults import caption
-from sprag.service.results.key_answers import answers_of_model
-from sprag.service.results.selection import held_text
-from sprag.worker.spread import DRIVE
+from sprag_study.sentences import Amount, Name
+from sprag_study.service.figures.answers import answers_figure
+from sprag_study.service.figures.front import NUMBER, front_figure, quantities
+from sprag_study.service.figures.orders import motion_name, motion_text
+from sprag_study.service.languages import _
+from sprag_study.service.reading.part_names import upper_first
+from sprag_study.service.reading.reader import Phrase, joined, plural
+from sprag_study.service.report.blocks import Block, Section, Table, Text
+from sprag_study.service.report.conditions import conditions
+from sprag_study.service.report.content import varies
+from sprag_study.service.report.drawn import chosen_image, drawing_images, image, map_images
+from sprag_study.service.report.trust import trust
+from sprag_study.service.results.defaults import caption
+from sprag_study.service.results.key_answers import answers_of_model
+from sprag_study.service.results.selection import held_text
+from sprag_study.worker.spread import DRIVE
 
 if TYPE_CHECKING:
-    from sprag.service.report.blocks import Words
-    from sprag.service.report.content import Report
-    from sprag.service.results.curves import Curve
+    from sprag_study.service.report.blocks import Words
+    from sprag_study.service.report.content import Report
+    from sprag_study.service.results.curves import Curve
 
 #: Rows of the table of answers, curves above each other, drawings, columns of results, sentences about tolerances.
 _ROWS: Final = 10

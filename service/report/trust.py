@@ -6,20 +6,20 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import Amount
-from sprag.service.languages import _
-from sprag.service.reading.part_names import upper_first
-from sprag.service.reading.reader import Phrase, joined, plural
-from sprag.service.report.blocks import Text
-from sprag.service.results import refined
-from sprag.service.results.refined import curve_plan
-from sprag.service.results.regimes import left_out
-from sprag.worker import models
+from sprag_study.sentences import Amount
+from sprag_study.service.languages import _
+from sprag_study.service.reading.part_names import upper_first
+from sprag_study.service.reading.reader import Phrase, joined, plural
+from sprag_study.service.report.blocks import Text
+from sprag_study.service.results import refined
+from sprag_study.service.results.refined import curve_plan
+from sprag_study.service.results.regimes import left_out
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from sprag.service.report.content import Report
+    from sprag_study.service.report.content import Report
 
 #: Regimes of motions that repeat, and whose disturbances die away.
 _CERTIFIED: Final = ("periodic", "coasting", "held")

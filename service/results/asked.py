@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag.sentences import Amount, Name
-from sprag.service.reading.reader import Phrase, term
-from sprag.service.results.fronts import goal_of
-from sprag.worker import models
+from sprag_study.sentences import Amount, Name
+from sprag_study.service.reading.reader import Phrase, term
+from sprag_study.service.results.fronts import goal_of
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
-    from sprag.worker.planning.goals.plan import Goal, Limit
-    from sprag.worker.study import Study
+    from sprag_study.worker.planning.goals.plan import Goal, Limit
+    from sprag_study.worker.study import Study
 
 
 def goals_of(study: Study) -> list[Phrase]:

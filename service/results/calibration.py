@@ -7,27 +7,27 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.sentences import Amount, Name, Part
-from sprag.service import exports
-from sprag.service.faults import Fault, FaultError
-from sprag.service.json_text import numbers
-from sprag.service.languages import N_
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.reader import Phrase, joined, plural
-from sprag.worker import models
-from sprag.worker.models import WorkerEnding
-from sprag.worker.planning.calibrate import CalibratePlan, CalibratePlanner
-from sprag.worker.planning.calibrate.answer import Answer, Direction, answer
-from sprag.worker.planning.calibrate.plan import CALIBRATE
-from sprag.worker.planning.calibrate.stored import from_json
-from sprag.worker.planning.rounds import Rows
+from sprag_study.sentences import Amount, Name, Part
+from sprag_study.service import exports
+from sprag_study.service.faults import Fault, FaultError
+from sprag_study.service.json_text import numbers
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.reader import Phrase, joined, plural
+from sprag_study.worker import models
+from sprag_study.worker.models import WorkerEnding
+from sprag_study.worker.planning.calibrate import CalibratePlan, CalibratePlanner
+from sprag_study.worker.planning.calibrate.answer import Answer, Direction, answer
+from sprag_study.worker.planning.calibrate.plan import CALIBRATE
+from sprag_study.worker.planning.calibrate.stored import from_json
+from sprag_study.worker.planning.rounds import Rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
-    from sprag.service.answers.calibration import (
+    from sprag_study.service.answers.calibration import (
         CalibratedParameter,
         CalibrationCurvePoint,
         CalibrationDirection,
@@ -35,11 +35,11 @@ if TYPE_CHECKING:
         CalibrationReport,
         NextMeasurement,
     )
-    from sprag.service.reading.quantities import Units
-    from sprag.service.results.curves import Fetch
-    from sprag.service.storage.studies.records import RoundRecord
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.study import Study
+    from sprag_study.service.reading.quantities import Units
+    from sprag_study.service.results.curves import Fetch
+    from sprag_study.service.storage.studies.records import RoundRecord
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.study import Study
 
 
 @dataclass(frozen=True, slots=True)

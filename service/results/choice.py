@@ -9,10 +9,10 @@ from urllib.parse import parse_qsl
 
 import numpy as np
 
-from sprag.service.faults import refused
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.results.curves import CurveQuery
-from sprag.service.results.defaults import (
+from sprag_study.service.faults import refused
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.results.curves import CurveQuery
+from sprag_study.service.results.defaults import (
     MOST_CHOICES,
     listed_held,
     main_query,
@@ -21,15 +21,15 @@ from sprag.service.results.defaults import (
     usual_value,
     varying_axes,
 )
-from sprag.service.results.refined import curve_plan, families, plan_along
-from sprag.service.results.refined_maps import map_plan
-from sprag.service.results.selection import locate_axes, value_of
-from sprag.worker import models
-from sprag.worker.directions import SWEEP
+from sprag_study.service.results.refined import curve_plan, families, plan_along
+from sprag_study.service.results.refined_maps import map_plan
+from sprag_study.service.results.selection import locate_axes, value_of
+from sprag_study.worker import models
+from sprag_study.worker.directions import SWEEP
 
 if TYPE_CHECKING:
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.study import Study
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.study import Study
 
 
 class Given(Protocol):

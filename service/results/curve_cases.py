@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import Sentence
-from sprag.service.faults import ParameterFault, SelectionError, refused
-from sprag.service.languages import N_
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.results.curves import Curve, CurveQuery, Curves, Fetch, Map, Selection, not_run
-from sprag.service.results.listed_cases import cases_with, left_open, machines
-from sprag.service.results.refined import Line, families, plan_along, refined_curves
-from sprag.service.results.refined_maps import draw_refined_map, map_plan
-from sprag.service.results.regimes import kind_columns, kinds_of
-from sprag.service.results.selection import (
+from sprag_study.sentences import Sentence
+from sprag_study.service.faults import ParameterFault, SelectionError, refused
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.results.curves import Curve, CurveQuery, Curves, Fetch, Map, Selection, not_run
+from sprag_study.service.results.listed_cases import cases_with, left_open, machines
+from sprag_study.service.results.refined import Line, families, plan_along, refined_curves
+from sprag_study.service.results.refined_maps import draw_refined_map, map_plan
+from sprag_study.service.results.regimes import kind_columns, kinds_of
+from sprag_study.service.results.selection import (
     LEFT_OPEN,
     Fixed,
     axis_name,
@@ -35,18 +35,18 @@ from sprag.service.results.selection import (
     require_axis,
     with_nominal,
 )
-from sprag.service.results.sweeps import jumps_of_line, swept_along
-from sprag.worker import models
-from sprag.worker.codes import PENDING
-from sprag.worker.directions import SWEEP
-from sprag.worker.limits import MAX_CURVE_VALUES
+from sprag_study.service.results.sweeps import jumps_of_line, swept_along
+from sprag_study.worker import models
+from sprag_study.worker.codes import PENDING
+from sprag_study.worker.directions import SWEEP
+from sprag_study.worker.limits import MAX_CURVE_VALUES
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.planning.refine import Curve as Refined
-    from sprag.worker.study import Study
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.planning.refine import Curve as Refined
+    from sprag_study.worker.study import Study
 
 #: No chosen values of axes: curves for all of them.
 NOTHING: Final[Mapping[int, Sequence[int]]] = MappingProxyType({})

@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.service.answers import filled
-from sprag.service.answers.results import Curve as CurveData
-from sprag.service.answers.results import CurvesData, Jump, MapData, MapPoints, MapResult, ResultMeaning
-from sprag.service.json_text import numbers
-from sprag.service.reading.directions import in_words
-from sprag.service.results.refined import Line, RefinedMap, jumps_of
-from sprag.worker.codes import PENDING
-from sprag.worker.models import OK, WorkerEnding
+from sprag_study.service.answers import filled
+from sprag_study.service.answers.results import Curve as CurveData
+from sprag_study.service.answers.results import CurvesData, Jump, MapData, MapPoints, MapResult, ResultMeaning
+from sprag_study.service.json_text import numbers
+from sprag_study.service.reading.directions import in_words
+from sprag_study.service.results.refined import Line, RefinedMap, jumps_of
+from sprag_study.worker.codes import PENDING
+from sprag_study.worker.models import OK, WorkerEnding
 
 if TYPE_CHECKING:
-    from sprag.service.storage.studies.records import CaseColumns
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.planning.refine import Curve as Refined
-    from sprag.worker.planning.refine_plan import RefinePlan
+    from sprag_study.service.storage.studies.records import CaseColumns
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.planning.refine import Curve as Refined
+    from sprag_study.worker.planning.refine_plan import RefinePlan
 
 #: Results of cases, aligned with them: (case numbers, result names) -> columns.
 Fetch = Callable[[NDArray[np.int64], Sequence[str]], "CaseColumns"]
@@ -74,8 +74,8 @@ class Curve:
 
     Of a settled study also with their regimes, and the excitation periods after which their motions repeat;
     of a refined curve what its planner says of it, of a sweep its jumps. ``flags`` are those of each case, joined by
-    commas, where they are known, and ``usable`` says which results count (`sprag.worker.models.usable`), by name: no
-    line goes through others, and no answer is read from them.
+    commas, where they are known, and ``usable`` says which results count (`sprag_study.worker.models.usable`), by name:
+    no line goes through others, and no answer is read from them.
     """
 
     line: Line

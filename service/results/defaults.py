@@ -9,26 +9,33 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import Name, Part
-from sprag.service.faults import refused
-from sprag.service.languages import N_
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.reader import Phrase, joined, plural
-from sprag.service.results.curves import CurveQuery
-from sprag.service.results.listed_cases import MOST_CURVES, cases_with, left_open, longest, open_axes, usual_machine
-from sprag.service.results.refined import curve_plan, families
-from sprag.service.results.refined_maps import map_plan, squares
-from sprag.service.results.selection import axis_name, held_text, locate_axes, value_of
-from sprag.worker import models
-from sprag.worker.directions import SWEEP
-from sprag.worker.models import NO_PARAMETERS
-from sprag.worker.spread import DRIVE
+from sprag_study.sentences import Name, Part
+from sprag_study.service.faults import refused
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.reader import Phrase, joined, plural
+from sprag_study.service.results.curves import CurveQuery
+from sprag_study.service.results.listed_cases import (
+    MOST_CURVES,
+    cases_with,
+    left_open,
+    longest,
+    open_axes,
+    usual_machine,
+)
+from sprag_study.service.results.refined import curve_plan, families
+from sprag_study.service.results.refined_maps import map_plan, squares
+from sprag_study.service.results.selection import axis_name, held_text, locate_axes, value_of
+from sprag_study.worker import models
+from sprag_study.worker.directions import SWEEP
+from sprag_study.worker.models import NO_PARAMETERS
+from sprag_study.worker.spread import DRIVE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.study import Axis, Study
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.study import Axis, Study
 
 #: Of an axis with more values than `MOST_CURVES`, so many of these are drawn first.
 _CHOSEN_CURVES: Final = 6

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sprag.service import exports
-from sprag.service.reading.directions import in_words
-from sprag.service.results.curves import flag_names
+from sprag_study.service import exports
+from sprag_study.service.reading.directions import in_words
+from sprag_study.service.results.curves import flag_names
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from sprag.service.reading.reader import Reading
-    from sprag.service.results.curves import Curve, Curves
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.service.results.curves import Curve, Curves
 
 #: Curves of studies with their labels.
 Drawn = list[tuple[str, "Curves"]]

@@ -7,33 +7,33 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.exports.inputs import inputs as every_input
-from sprag.service.languages import N_
-from sprag.service.languages import gettext as _
-from sprag.service.reading.catalogue import shown_values, unit_of
-from sprag.service.reading.part_names import part_name, upper_first
-from sprag.service.reading.reader import Phrase, joined, model_title, plural, term
-from sprag.service.reading.wording import number, typed_text, unit_text
-from sprag.service.results.asked import goals_of, limits_of
-from sprag.service.results.calibration import plan_of
-from sprag.service.results.shown_inputs import choice_name, in_words, run_settings
-from sprag.service.results.varied import formula_text, in_captions, names_in_files, varied, with_distribution
-from sprag.service.spec.described import Described
-from sprag.service.spec.kinds.calibrate import CALIBRATE as CALIBRATION
-from sprag.service.spec.kinds.goal import GOAL as SEARCH
-from sprag.service.spec.kinds.refine import REFINE as REFINEMENT
-from sprag.worker.directions import SWEEP, direction
-from sprag.worker.planning.calibrate.plan import CALIBRATE
-from sprag.worker.planning.goals.plan import GOAL
-from sprag.worker.planning.refine_plan import REFINE, RefinePlan
+from sprag_study.service.exports.inputs import inputs as every_input
+from sprag_study.service.languages import N_
+from sprag_study.service.languages import gettext as _
+from sprag_study.service.reading.catalogue import shown_values, unit_of
+from sprag_study.service.reading.part_names import part_name, upper_first
+from sprag_study.service.reading.reader import Phrase, joined, model_title, plural, term
+from sprag_study.service.reading.wording import number, typed_text, unit_text
+from sprag_study.service.results.asked import goals_of, limits_of
+from sprag_study.service.results.calibration import plan_of
+from sprag_study.service.results.shown_inputs import choice_name, in_words, run_settings
+from sprag_study.service.results.varied import formula_text, in_captions, names_in_files, varied, with_distribution
+from sprag_study.service.spec.described import Described
+from sprag_study.service.spec.kinds.calibrate import CALIBRATE as CALIBRATION
+from sprag_study.service.spec.kinds.goal import GOAL as SEARCH
+from sprag_study.service.spec.kinds.refine import REFINE as REFINEMENT
+from sprag_study.worker.directions import SWEEP, direction
+from sprag_study.worker.planning.calibrate.plan import CALIBRATE
+from sprag_study.worker.planning.goals.plan import GOAL
+from sprag_study.worker.planning.refine_plan import REFINE, RefinePlan
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
-    from sprag.service.exports.inputs import Input
-    from sprag.service.reading.reader import Reading
-    from sprag.service.results.varied import Text
-    from sprag.worker.study import Axis, Study
+    from sprag_study.service.exports.inputs import Input
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.service.results.varied import Text
+    from sprag_study.worker.study import Axis, Study
 
 #: Characters of an input in the table.
 _LONGEST: Final = 120

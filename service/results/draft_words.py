@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.sentences import Amount
-from sprag.service.languages import gettext
-from sprag.service.reading.catalogue import shown_values, unit_of
-from sprag.service.reading.reader import Phrase, plural
-from sprag.service.reading.wording import number
-from sprag.worker.models import NO_PARAMETERS, SETTLED
+from sprag_study.sentences import Amount
+from sprag_study.service.languages import gettext
+from sprag_study.service.reading.catalogue import shown_values, unit_of
+from sprag_study.service.reading.reader import Phrase, plural
+from sprag_study.service.reading.wording import number
+from sprag_study.worker.models import NO_PARAMETERS, SETTLED
 
 if TYPE_CHECKING:
-    from sprag.service.answers.studies import Preview
-    from sprag.service.reading.reader import Reading
-    from sprag.worker.study import Axis, Study
+    from sprag_study.service.answers.studies import Preview
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.worker.study import Axis, Study
 
 #: Axes that are described one by one; of more only the number is stated.
 _MOST_AXES: Final = 4

@@ -9,30 +9,30 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import Sentence, joined, plural
-from sprag.service import exports
-from sprag.service.answers.explore import Exploration, ExploredCase, Histogram
-from sprag.service.faults import refused
-from sprag.service.languages import N_
-from sprag.service.reading.catalogue import result_of, unit_of
-from sprag.service.reading.directions import case_values
-from sprag.service.reading.limits import at_most
-from sprag.service.reading.texts import did_you_mean
-from sprag.service.reading.units import plain_signs
-from sprag.service.results.regimes import kind_columns
-from sprag.service.results.selection import listed, locate_axes, own_paths, refuse_mixed_texts, value_of
-from sprag.worker import models
-from sprag.worker.codes import FLAG_MASKS
+from sprag_study.sentences import Sentence, joined, plural
+from sprag_study.service import exports
+from sprag_study.service.answers.explore import Exploration, ExploredCase, Histogram
+from sprag_study.service.faults import refused
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.catalogue import result_of, unit_of
+from sprag_study.service.reading.directions import case_values
+from sprag_study.service.reading.limits import at_most
+from sprag_study.service.reading.texts import did_you_mean
+from sprag_study.service.reading.units import plain_signs
+from sprag_study.service.results.regimes import kind_columns
+from sprag_study.service.results.selection import listed, locate_axes, own_paths, refuse_mixed_texts, value_of
+from sprag_study.worker import models
+from sprag_study.worker.codes import FLAG_MASKS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
-    from sprag.service.reading.reader import Reading
-    from sprag.service.storage.rows.columns import RowColumns
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.study import Study
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.service.storage.rows.columns import RowColumns
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.study import Study
 
 #: What a range may look like.
 EXAMPLES: Final = N_("for instance shaft.load <= 2 N*m or efficiency >= 0.5")

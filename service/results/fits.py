@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.answers import filled
-from sprag.service.answers.studies import ClutchFitReport, FitDegree
-from sprag.service.faults import warned
-from sprag.service.spec.described import Record
-from sprag.service.spec.machine.clutch import MEASURED, read_measured
-from sprag.service.spec.node import Node
-from sprag.service.spec.report import Report
-from sprag.service.spec.schema.quantity import QUANTITY
-from sprag.worker import models
-from sprag.worker.models.parameters import placed
+from sprag_study.service.answers import filled
+from sprag_study.service.answers.studies import ClutchFitReport, FitDegree
+from sprag_study.service.faults import warned
+from sprag_study.service.spec.described import Record
+from sprag_study.service.spec.machine.clutch import MEASURED, read_measured
+from sprag_study.service.spec.node import Node
+from sprag_study.service.spec.report import Report
+from sprag_study.service.spec.schema.quantity import QUANTITY
+from sprag_study.worker import models
+from sprag_study.worker.models.parameters import placed
 
 if TYPE_CHECKING:
-    from sprag.worker.models import ClutchFit
+    from sprag_study.worker.models import ClutchFit
 
 #: A request for a fit.
 REQUEST: Final = Record(

@@ -8,33 +8,33 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 
-from sprag.service import exports
-from sprag.service.answers.goals import Design, DesignGoal, DesignLimit, DesignVariable, FrontReport, Generation
-from sprag.service.faults import Fault, FaultError
-from sprag.service.json_text import numbers
-from sprag.service.languages import N_
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.results.explore import Further
-from sprag.service.results.regimes import kind_columns
-from sprag.worker import models
-from sprag.worker.models import WorkerEnding
-from sprag.worker.planning.goals import GoalPlan, front
-from sprag.worker.planning.goals.plan import GOAL
-from sprag.worker.planning.goals.polish import MET
-from sprag.worker.planning.goals.robust import Table
-from sprag.worker.planning.rounds import Rows
+from sprag_study.service import exports
+from sprag_study.service.answers.goals import Design, DesignGoal, DesignLimit, DesignVariable, FrontReport, Generation
+from sprag_study.service.faults import Fault, FaultError
+from sprag_study.service.json_text import numbers
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.results.explore import Further
+from sprag_study.service.results.regimes import kind_columns
+from sprag_study.worker import models
+from sprag_study.worker.models import WorkerEnding
+from sprag_study.worker.planning.goals import GoalPlan, front
+from sprag_study.worker.planning.goals.plan import GOAL
+from sprag_study.worker.planning.goals.polish import MET
+from sprag_study.worker.planning.goals.robust import Table
+from sprag_study.worker.planning.rounds import Rows
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from sprag.service.reading.quantities import Units
-    from sprag.service.results.curves import Fetch
-    from sprag.service.storage.studies.records import RoundRecord
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.planning.goals import Front, Limit
-    from sprag.worker.study import Study
+    from sprag_study.service.reading.quantities import Units
+    from sprag_study.service.results.curves import Fetch
+    from sprag_study.service.storage.studies.records import RoundRecord
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.planning.goals import Front, Limit
+    from sprag_study.worker.study import Study
 
 #: Designs that are answered unless more are asked for.
 DESIGNS: Final = 2000

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.service.results.refined import stretches as refined_stretches
-from sprag.service.results.regimes import stretches
-from sprag.service.results.sweeps import broken_at
+from sprag_study.service.results.refined import stretches as refined_stretches
+from sprag_study.service.results.regimes import stretches
+from sprag_study.service.results.sweeps import broken_at
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.results.curves import Curve
+    from sprag_study.service.results.curves import Curve
 
 
 def joined_points(curve: Curve, name: str) -> tuple[NDArray[np.int64], ...] | None:

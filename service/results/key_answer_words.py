@@ -5,21 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.sentences import Amount, Name
-from sprag.service import exports
-from sprag.service.answers.key import AnswerFacts, AnswerReport, AnswerValue, CurveAnswer, OverallAnswer
-from sprag.service.languages import available, language
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.directions import case_values, in_words
-from sprag.service.reading.reader import Phrase, joined, plural, shown, term
-from sprag.service.reading.wording import percent
-from sprag.service.results.selection import axis_name
-from sprag.worker.directions import SWEEP, direction
+from sprag_study.sentences import Amount, Name
+from sprag_study.service import exports
+from sprag_study.service.answers.key import AnswerFacts, AnswerReport, AnswerValue, CurveAnswer, OverallAnswer
+from sprag_study.service.languages import available, language
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.directions import case_values, in_words
+from sprag_study.service.reading.reader import Phrase, joined, plural, shown, term
+from sprag_study.service.reading.wording import percent
+from sprag_study.service.results.selection import axis_name
+from sprag_study.worker.directions import SWEEP, direction
 
 if TYPE_CHECKING:
-    from sprag.service.reading.reader import Reading
-    from sprag.service.results.key_answers import CurveAnswers, Found, StudyAnswers
-    from sprag.worker.study import Study
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.service.results.key_answers import CurveAnswers, Found, StudyAnswers
+    from sprag_study.worker.study import Study
 
 _EXTREMES: Final = ("largest", "smallest")
 

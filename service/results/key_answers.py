@@ -13,30 +13,30 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from sprag.sentences import Name
-from sprag.service.faults import refused
-from sprag.service.languages import N_
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.reader import Phrase
-from sprag.service.results.curve_cases import draw, select
-from sprag.service.results.curves import Curve
-from sprag.service.results.defaults import drawn_results, main_query, main_results, usual_value
-from sprag.service.results.joined import joined_points
-from sprag.service.results.refined import Line, curve_plan
-from sprag.service.results.regimes import kind_columns
-from sprag.service.results.selection import require_axis, value_of
-from sprag.worker import models
-from sprag.worker.codes import PENDING
-from sprag.worker.models.presentation import Answer
-from sprag.worker.study import SAME_VALUE
+from sprag_study.sentences import Name
+from sprag_study.service.faults import refused
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.reader import Phrase
+from sprag_study.service.results.curve_cases import draw, select
+from sprag_study.service.results.curves import Curve
+from sprag_study.service.results.defaults import drawn_results, main_query, main_results, usual_value
+from sprag_study.service.results.joined import joined_points
+from sprag_study.service.results.refined import Line, curve_plan
+from sprag_study.service.results.regimes import kind_columns
+from sprag_study.service.results.selection import require_axis, value_of
+from sprag_study.worker import models
+from sprag_study.worker.codes import PENDING
+from sprag_study.worker.models.presentation import Answer
+from sprag_study.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.results.curves import CurveQuery, Curves, Fetch
-    from sprag.service.storage.studies.records import CaseColumns
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.study import Study
+    from sprag_study.service.results.curves import CurveQuery, Curves, Fetch
+    from sprag_study.service.storage.studies.records import CaseColumns
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.study import Study
 
 #: Why there is no value: no case there, beyond the ends of the axis, between points that no line joins, no result, or
 #: only results of motions that had not settled.

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.worker.models import NO_PARAMETERS
+from sprag_study.worker.models import NO_PARAMETERS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
     Cases = NDArray[np.int64]
 

@@ -8,22 +8,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.sentences import Name
-from sprag.service.languages import N_
-from sprag.service.reading.reader import Phrase, joined, plural
-from sprag.service.reading.wording import percent
-from sprag.worker import models
-from sprag.worker.planning.refine import Curve as Refined
-from sprag.worker.planning.refine import describe
-from sprag.worker.planning.refine_plan import REFINE, RefinePlan
-from sprag.worker.planning.rounds import Rows
+from sprag_study.sentences import Name
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.reader import Phrase, joined, plural
+from sprag_study.service.reading.wording import percent
+from sprag_study.worker import models
+from sprag_study.worker.planning.refine import Curve as Refined
+from sprag_study.worker.planning.refine import describe
+from sprag_study.worker.planning.refine_plan import REFINE, RefinePlan
+from sprag_study.worker.planning.rounds import Rows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.answers.results import Jump
-    from sprag.service.storage.studies.records import CaseColumns
-    from sprag.worker.study import Study
+    from sprag_study.service.answers.results import Jump
+    from sprag_study.service.storage.studies.records import CaseColumns
+    from sprag_study.worker.study import Study
 
 
 @dataclass(frozen=True, slots=True)

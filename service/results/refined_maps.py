@@ -7,24 +7,24 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import Sentence
-from sprag.service.faults import refused
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.results.curves import Fetch, Map, not_run
-from sprag.service.results.refined import RefinedMap, refine_plan
-from sprag.service.results.selection import LEFT_OPEN, axis_name, held_texts, listed, locate_axes, numeric_results
-from sprag.worker import models
-from sprag.worker.codes import PENDING
-from sprag.worker.planning.refine import describe_maps
-from sprag.worker.planning.refine_plan import RefinePlan
-from sprag.worker.planning.rounds import Rows
+from sprag_study.sentences import Sentence
+from sprag_study.service.faults import refused
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.results.curves import Fetch, Map, not_run
+from sprag_study.service.results.refined import RefinedMap, refine_plan
+from sprag_study.service.results.selection import LEFT_OPEN, axis_name, held_texts, listed, locate_axes, numeric_results
+from sprag_study.worker import models
+from sprag_study.worker.codes import PENDING
+from sprag_study.worker.planning.refine import describe_maps
+from sprag_study.worker.planning.refine_plan import RefinePlan
+from sprag_study.worker.planning.rounds import Rows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.planning.refine import Map as Described
-    from sprag.worker.study import Study
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.planning.refine import Map as Described
+    from sprag_study.worker.study import Study
 
 #: Squares along an axis, at most; more cannot be seen in a picture.
 MOST_SQUARES: Final = 256

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.sentences import Amount
-from sprag.service.reading.reader import Phrase, joined, plural, term
-from sprag.worker.models import REGIME_SENTENCES
+from sprag_study.sentences import Amount
+from sprag_study.service.reading.reader import Phrase, joined, plural, term
+from sprag_study.worker.models import REGIME_SENTENCES
 
 if TYPE_CHECKING:
-    from sprag.worker.models import ResultInfo
+    from sprag_study.worker.models import ResultInfo
 
 #: The result with the number of excitation periods after which a motion repeats.
 ORDER: Final = "regime.order"

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.sentences import Amount
-from sprag.service.languages import N_, decimal
-from sprag.service.reading.reader import Phrase, joined, plural
-from sprag.service.reading.wording import percent
-from sprag.worker.planning.calibrate.plan import CALIBRATE
-from sprag.worker.planning.goals.plan import GOAL
-from sprag.worker.states import StudyState
+from sprag_study.sentences import Amount
+from sprag_study.service.languages import N_, decimal
+from sprag_study.service.reading.reader import Phrase, joined, plural
+from sprag_study.service.reading.wording import percent
+from sprag_study.worker.planning.calibrate.plan import CALIBRATE
+from sprag_study.worker.planning.goals.plan import GOAL
+from sprag_study.worker.states import StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.answers.studies import Round, Rounds
-    from sprag.service.storage.studies.records import RoundProgress, RoundRecord
+    from sprag_study.service.answers.studies import Round, Rounds
+    from sprag_study.service.storage.studies.records import RoundProgress, RoundRecord
 
 
 def rounds_json(rounds: RoundProgress, state: StudyState, units: Sequence[str] = ()) -> Rounds:

@@ -8,23 +8,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.sentences import Amount, Name, Sentence, joined
-from sprag.service.faults import Fault, ParameterFault, SelectionError, parameter_error, refused, shown
-from sprag.service.languages import N_
-from sprag.service.reading.catalogue import result_of, unit_of, unknown_result
-from sprag.service.reading.numbers import in_language
-from sprag.service.reading.reader import Phrase, term
-from sprag.service.reading.texts import did_you_mean
-from sprag.service.reading.together import AMBIGUOUS_UNIT, question, with_unit_of_end
-from sprag.service.reading.units import QuantityError, typed_value
-from sprag.worker import models
-from sprag.worker.directions import DIRECTIONS, SWEEP, direction
-from sprag.worker.spread import DRIVE
-from sprag.worker.study import SAME_VALUE
+from sprag_study.sentences import Amount, Name, Sentence, joined
+from sprag_study.service.faults import Fault, ParameterFault, SelectionError, parameter_error, refused, shown
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.catalogue import result_of, unit_of, unknown_result
+from sprag_study.service.reading.numbers import in_language
+from sprag_study.service.reading.reader import Phrase, term
+from sprag_study.service.reading.texts import did_you_mean
+from sprag_study.service.reading.together import AMBIGUOUS_UNIT, question, with_unit_of_end
+from sprag_study.service.reading.units import QuantityError, typed_value
+from sprag_study.worker import models
+from sprag_study.worker.directions import DIRECTIONS, SWEEP, direction
+from sprag_study.worker.spread import DRIVE
+from sprag_study.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.study import Study
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.study import Study
 
 #: Fixed axes: position of the axis -> (the path that named it, position of the value on it).
 Fixed = dict[int, tuple[str, int]]

@@ -16,17 +16,17 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from sprag.sentences import Sentence
-from sprag.service.answers import filled
-from sprag.service.answers.results import AxisEffect, PairEffect, ResultSensitivity
-from sprag.service.faults import Fault, SelectionError, refused
-from sprag.service.json_text import numbers
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.reader import Phrase, plural
-from sprag.service.results.curves import Fetch
-from sprag.service.results.regimes import counted, kind_columns, kinds_of, left_out
-from sprag.service.results.selection import axis_name, numeric_results
-from sprag.service.results.sensitivity_design import (
+from sprag_study.sentences import Sentence
+from sprag_study.service.answers import filled
+from sprag_study.service.answers.results import AxisEffect, PairEffect, ResultSensitivity
+from sprag_study.service.faults import Fault, SelectionError, refused
+from sprag_study.service.json_text import numbers
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.reader import Phrase, plural
+from sprag_study.service.results.curves import Fetch
+from sprag_study.service.results.regimes import counted, kind_columns, kinds_of, left_out
+from sprag_study.service.results.selection import axis_name, numeric_results
+from sprag_study.service.results.sensitivity_design import (
     factorial_table,
     going_together,
     is_factorial,
@@ -34,7 +34,7 @@ from sprag.service.results.sensitivity_design import (
     scattered,
     why_no_shares,
 )
-from sprag.service.results.sensitivity_indices import (
+from sprag_study.service.results.sensitivity_indices import (
     LEAST_CASES,
     Indices,
     Pair,
@@ -44,15 +44,15 @@ from sprag.service.results.sensitivity_indices import (
     saltelli_indices,
     sample_indices,
 )
-from sprag.service.results.tolerances.nominal import nominal_only
-from sprag.service.spec.draws.unit import LEVELS, cases_of
-from sprag.worker import models
+from sprag_study.service.results.tolerances.nominal import nominal_only
+from sprag_study.service.spec.draws.unit import LEVELS, cases_of
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.study import Axis, Study
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.study import Axis, Study
 
     Numbers = NDArray[np.float64]
 

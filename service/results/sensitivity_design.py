@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import Name
-from sprag.service.reading.reader import Phrase
+from sprag_study.sentences import Name
+from sprag_study.service.reading.reader import Phrase
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.service.reading.reader import Phrase
+from sprag_study.service.reading.reader import Phrase
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -7,23 +7,23 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.exports.inputs import inputs as every_input
-from sprag.service.exports.inputs import run_inputs
-from sprag.service.languages import N_, _, decimal, gettext, grouped, ngettext
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.part_names import NUMBERED, lower_first, part_name, run_name
-from sprag.service.reading.wording import number, unit_text, words
-from sprag.service.results.varied import formula_text, values_text
-from sprag.service.spec.described import ANY_RUN, DURATION, SETTLED_RUN
-from sprag.service.spec.machine.shaft import MEAN_SPEED_IS
-from sprag.worker.models.parameters import parameter_of
+from sprag_study.service.exports.inputs import inputs as every_input
+from sprag_study.service.exports.inputs import run_inputs
+from sprag_study.service.languages import N_, _, decimal, gettext, grouped, ngettext
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.part_names import NUMBERED, lower_first, part_name, run_name
+from sprag_study.service.reading.wording import number, unit_text, words
+from sprag_study.service.results.varied import formula_text, values_text
+from sprag_study.service.spec.described import ANY_RUN, DURATION, SETTLED_RUN
+from sprag_study.service.spec.machine.shaft import MEAN_SPEED_IS
+from sprag_study.worker.models.parameters import parameter_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.exports.inputs import Input
-    from sprag.service.reading.reader import Reading
-    from sprag.worker.study import Study
+    from sprag_study.service.exports.inputs import Input
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.worker.study import Study
 
 _RUN: Final = {entry.name: entry for entry in (*SETTLED_RUN.values(), DURATION, *ANY_RUN.values())}
 _NUMBER: Final = re.compile(rf"({'|'.join(NUMBERED)})\.(\d+)\.")

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag.service.faults import parameter_error
-from sprag.service.reading.limits import span
-from sprag.service.results.selection import of_name
-from sprag.worker.models.starts import count_of
-from sprag.worker.models.vibration_drive.start_states import impossible_starts, is_state
+from sprag_study.service.faults import parameter_error
+from sprag_study.service.reading.limits import span
+from sprag_study.service.results.selection import of_name
+from sprag_study.worker.models.starts import count_of
+from sprag_study.worker.models.vibration_drive.start_states import impossible_starts, is_state
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
 
 def refuse_impossible(

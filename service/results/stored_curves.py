@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.results.curve_cases import draw, draw_map, select
-from sprag.worker import models
+from sprag_study.service.results.curve_cases import draw, draw_map, select
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
-    from sprag.service.results.curves import Curve, CurveQuery, Curves, Map
-    from sprag.service.storage.store import Store
+    from sprag_study.service.results.curves import Curve, CurveQuery, Curves, Map
+    from sprag_study.service.storage.store import Store
 
 #: Further motions of each case that a picture marks.
 _MOST_FURTHER: Final = 4

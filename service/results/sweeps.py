@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import Amount, Name, Part
-from sprag.service.reading.reader import Phrase, joined, plural, term
-from sprag.service.reading.wording import percent
-from sprag.worker.directions import DOWN, SWEEP, direction
-from sprag.worker.models import JUMPED
+from sprag_study.sentences import Amount, Name, Part
+from sprag_study.service.reading.reader import Phrase, joined, plural, term
+from sprag_study.service.reading.wording import percent
+from sprag_study.worker.directions import DOWN, SWEEP, direction
+from sprag_study.worker.models import JUMPED
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.answers.results import Jump
-    from sprag.service.results.curves import Curve, Curves
-    from sprag.service.results.refined import Line
-    from sprag.worker.study import Study
+    from sprag_study.service.answers.results import Jump
+    from sprag_study.service.results.curves import Curve, Curves
+    from sprag_study.service.results.refined import Line
+    from sprag_study.worker.study import Study
 
 #: Difference of up and down, relative to the range of both, from which on it is reported.
 _DIFFERENT: Final = 0.01

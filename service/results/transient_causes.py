@@ -7,9 +7,9 @@ import re
 from functools import cache
 from typing import Final
 
-from sprag.sentences import Amount
-from sprag.service.languages import N_
-from sprag.service.reading.reader import Phrase
+from sprag_study.sentences import Amount
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.reader import Phrase
 
 #: The words for outcomes, of which `term` makes phrases.
 _OUTCOMES: Final = (

@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from cachetools import LRUCache, cachedmethod
 
-from sprag.sentences import Place, Sentence, WarningText
-from sprag.service.results.curves import Fetch
-from sprag.service.results.tolerances.nominal import nominal_only
-from sprag.worker import models
+from sprag_study.sentences import Place, Sentence, WarningText
+from sprag_study.service.results.curves import Fetch
+from sprag_study.service.results.tolerances.nominal import nominal_only
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.storage.store import Store
-    from sprag.service.storage.studies.records import StudyRecord
-    from sprag.worker.study import Study
+    from sprag_study.service.storage.store import Store
+    from sprag_study.service.storage.studies.records import StudyRecord
+    from sprag_study.worker.study import Study
 
     Cases = NDArray[np.int64]
 

@@ -7,25 +7,25 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.sentences import Amount
-from sprag.service.languages import _
-from sprag.service.reading.catalogue import axes_json, shown_values, unit_of
-from sprag.service.reading.reader import CODES, Phrase, joined, plural, term
-from sprag.service.reading.wording import number, typed_text, unit_text
-from sprag.service.results.calibration import plan_of
-from sprag.service.results.fronts import goal_of
-from sprag.worker.models import NO_PARAMETERS
-from sprag.worker.planning.calibrate.plan import CALIBRATE
-from sprag.worker.planning.goals.plan import GOAL
+from sprag_study.sentences import Amount
+from sprag_study.service.languages import _
+from sprag_study.service.reading.catalogue import axes_json, shown_values, unit_of
+from sprag_study.service.reading.reader import CODES, Phrase, joined, plural, term
+from sprag_study.service.reading.wording import number, typed_text, unit_text
+from sprag_study.service.results.calibration import plan_of
+from sprag_study.service.results.fronts import goal_of
+from sprag_study.worker.models import NO_PARAMETERS
+from sprag_study.worker.planning.calibrate.plan import CALIBRATE
+from sprag_study.worker.planning.goals.plan import GOAL
 
 if TYPE_CHECKING:
     from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 
-    from sprag.service.exports.inputs import Input
-    from sprag.service.reading.reader import Reading
-    from sprag.worker.planning.calibrate.plan import Unknown
-    from sprag.worker.planning.goals.plan import Variable
-    from sprag.worker.study import Axis, Study
+    from sprag_study.service.exports.inputs import Input
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.worker.planning.calibrate.plan import Unknown
+    from sprag_study.worker.planning.goals.plan import Variable
+    from sprag_study.worker.study import Axis, Study
 
 Text = str | Amount
 #: Digits of an end.

@@ -5,16 +5,16 @@ from __future__ import annotations
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Final
 
-from sprag.sentences import Amount, Sentence, WarningText, plural
-from sprag.service.faults import Code
-from sprag.service.languages import N_
-from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity
-from sprag.service.schedules.times import TimingError, next_time_of_day, read_time_of_day
-from sprag.worker.limits import MAX_FINISH_DAYS
-from sprag.worker.order import coverage, order_of
+from sprag_study.sentences import Amount, Sentence, WarningText, plural
+from sprag_study.service.faults import Code
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.units import QuantityError, parse_quantity, split_quantity
+from sprag_study.service.schedules.times import TimingError, next_time_of_day, read_time_of_day
+from sprag_study.worker.limits import MAX_FINISH_DAYS
+from sprag_study.worker.order import coverage, order_of
 
 if TYPE_CHECKING:
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
 #: Shortest time to a deadline, in s; a shorter one is a mistake.
 _LEAST_SECONDS: Final = 1.0

@@ -6,14 +6,14 @@ from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.sentences import Sentence
-from sprag.service.languages import N_
-from sprag.service.reading.limits import characters
-from sprag.service.reading.texts import did_you_mean
-from sprag.service.schedules.deadline import ALLOWED_OF_RUNS, FinishError, check_run_finish, run_finish_at
-from sprag.service.schedules.policies import GRACE_ALLOWED, CatchUp, Overlap, Policies, check_grace
-from sprag.service.schedules.report_to import ReportTo, ReportWhen, read_report_to
-from sprag.service.schedules.times import (
+from sprag_study.sentences import Sentence
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.limits import characters
+from sprag_study.service.reading.texts import did_you_mean
+from sprag_study.service.schedules.deadline import ALLOWED_OF_RUNS, FinishError, check_run_finish, run_finish_at
+from sprag_study.service.schedules.policies import GRACE_ALLOWED, CatchUp, Overlap, Policies, check_grace
+from sprag_study.service.schedules.report_to import ReportTo, ReportWhen, read_report_to
+from sprag_study.service.schedules.times import (
     Timing,
     TimingError,
     Window,
@@ -22,13 +22,13 @@ from sprag.service.schedules.times import (
     read_moment,
     read_time_of_day,
 )
-from sprag.service.schedules.trouble import read_trouble_flags
-from sprag.service.spec.described import Described, choice, named
-from sprag.service.spec.document import parse_spec
-from sprag.service.spec.node import Node
-from sprag.service.spec.report import Report, SpecError
-from sprag.service.zones import zones
-from sprag.worker.limits import MAX_NAME_LENGTH, MAX_PRIORITY
+from sprag_study.service.schedules.trouble import read_trouble_flags
+from sprag_study.service.spec.described import Described, choice, named
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.node import Node
+from sprag_study.service.spec.report import Report, SpecError
+from sprag_study.service.zones import zones
+from sprag_study.worker.limits import MAX_NAME_LENGTH, MAX_PRIORITY
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

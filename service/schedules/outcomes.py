@@ -7,9 +7,9 @@ from datetime import datetime
 from enum import StrEnum
 from typing import Any, Final
 
-from sprag.sentences import Sentence, sentence_of
-from sprag.service.languages import N_, gettext, grouped, ngettext
-from sprag.service.reading.reader import told
+from sprag_study.sentences import Sentence, sentence_of
+from sprag_study.service.languages import N_, gettext, grouped, ngettext
+from sprag_study.service.reading.reader import told
 
 
 class Result(StrEnum):

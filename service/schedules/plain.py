@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from sprag.service.languages import N_, gettext
-from sprag.service.reading.wording import duration
-from sprag.service.schedules.deadline import FinishError, duration_seconds
+from sprag_study.service.languages import N_, gettext
+from sprag_study.service.reading.wording import duration
+from sprag_study.service.schedules.deadline import FinishError, duration_seconds
 
 #: What follows "day of the week" in a cron expression, and what people say.
 DAYS: Final = {

@@ -7,12 +7,12 @@ from datetime import datetime, timedelta
 from enum import StrEnum
 from typing import TYPE_CHECKING, Final
 
-from sprag.sentences import Sentence
-from sprag.service.schedules.deadline import duration_seconds
-from sprag.worker.limits import MAX_FINISH_DAYS
+from sprag_study.sentences import Sentence
+from sprag_study.service.schedules.deadline import duration_seconds
+from sprag_study.worker.limits import MAX_FINISH_DAYS
 
 if TYPE_CHECKING:
-    from sprag.service.schedules.times import Timing
+    from sprag_study.service.schedules.times import Timing
 
 #: A due time that is taken up later than this has been missed, for `CatchUp.NONE`.
 ON_TIME: Final = timedelta(minutes=1)

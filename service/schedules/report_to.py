@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.sentences import Sentence, plural
-from sprag.service.delivery import is_mail_address, origin_of
-from sprag.service.spec.report import Report
+from sprag_study.sentences import Sentence, plural
+from sprag_study.service.delivery import is_mail_address, origin_of
+from sprag_study.service.spec.report import Report
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from sprag.service.delivery import Delivery
+    from sprag_study.service.delivery import Delivery
 
 MOST_RECIPIENTS: Final = 10
 LONGEST_WEBHOOK: Final = 500

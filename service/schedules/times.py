@@ -16,10 +16,10 @@ from zoneinfo import ZoneInfo
 
 from cronsim import CronSim, CronSimError
 
-from sprag.sentences import Sentence
-from sprag.service.faults import Code
-from sprag.service.languages import recorded
-from sprag.service.schedules.occurrences import Occurrences
+from sprag_study.sentences import Sentence
+from sprag_study.service.faults import Code
+from sprag_study.service.languages import recorded
+from sprag_study.service.schedules.occurrences import Occurrences
 
 #: Short forms of cron expressions.
 ALIASES: Final = {

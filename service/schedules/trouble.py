@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag.sentences import Sentence
-from sprag.service.reading.texts import did_you_mean
-from sprag.service.spec.report import Report
-from sprag.worker import models
+from sprag_study.sentences import Sentence
+from sprag_study.service.reading.texts import did_you_mean
+from sprag_study.service.spec.report import Report
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

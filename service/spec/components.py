@@ -11,26 +11,26 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, Final
 
-from sprag.sentences import Sentence, plural
-from sprag.service.faults import Fault
-from sprag.service.languages import N_
-from sprag.service.reading.catalogue import range_sentence
-from sprag.service.reading.limits import characters
-from sprag.service.reading.numbers import parse_number, settled
-from sprag.service.reading.printed import could_be_several, could_be_values
-from sprag.service.reading.together import AMBIGUOUS_UNIT, questions
-from sprag.service.reading.units import QuantityError, has_unit
-from sprag.service.spec.csv_text import Column, in_cell, read_csv, refuse_mixed_column, unescape
-from sprag.service.spec.described import Record
-from sprag.service.spec.labels import LINES_ALLOWED, printable_lines
-from sprag.service.spec.node import Node, exact
-from sprag.service.spec.report import Report, SpecError
-from sprag.service.spec.table_text import heading_of
-from sprag.worker import models
-from sprag.worker.limits import MAX_COMPONENTS, MAX_NAME_LENGTH, MAX_NOTES_LENGTH
-from sprag.worker.models.form import ComponentKind
-from sprag.worker.models.parameters import placed
-from sprag.worker.models.registry import all_models
+from sprag_study.sentences import Sentence, plural
+from sprag_study.service.faults import Fault
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.catalogue import range_sentence
+from sprag_study.service.reading.limits import characters
+from sprag_study.service.reading.numbers import parse_number, settled
+from sprag_study.service.reading.printed import could_be_several, could_be_values
+from sprag_study.service.reading.together import AMBIGUOUS_UNIT, questions
+from sprag_study.service.reading.units import QuantityError, has_unit
+from sprag_study.service.spec.csv_text import Column, in_cell, read_csv, refuse_mixed_column, unescape
+from sprag_study.service.spec.described import Record
+from sprag_study.service.spec.labels import LINES_ALLOWED, printable_lines
+from sprag_study.service.spec.node import Node, exact
+from sprag_study.service.spec.report import Report, SpecError
+from sprag_study.service.spec.table_text import heading_of
+from sprag_study.worker import models
+from sprag_study.worker.limits import MAX_COMPONENTS, MAX_NAME_LENGTH, MAX_NOTES_LENGTH
+from sprag_study.worker.models.form import ComponentKind
+from sprag_study.worker.models.parameters import placed
+from sprag_study.worker.models.registry import all_models
 
 #: Each kind, and the model whose machines have such components.
 _KINDS: Final = {kind.name: (model.name, kind) for model in all_models() for kind in model.presentation.form.components}

@@ -10,22 +10,22 @@ import math
 import re
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from sprag.sentences import Sentence, joined, plural
-from sprag.service.languages import N_
-from sprag.service.reading.catalogue import range_sentence
-from sprag.service.reading.limits import at_most
-from sprag.service.reading.numbers import WITHOUT_DOUBT, assumption, of_line, parse_number, question
-from sprag.service.reading.texts import shorten_text
-from sprag.service.reading.together import AMBIGUOUS_UNIT, questions
-from sprag.service.reading.units import QuantityError, to_float
-from sprag.service.spec.node import exact
-from sprag.service.spec.table_text import MAX_HEADING, CsvRow, Split, settled_table, split, with_units
+from sprag_study.sentences import Sentence, joined, plural
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.catalogue import range_sentence
+from sprag_study.service.reading.limits import at_most
+from sprag_study.service.reading.numbers import WITHOUT_DOUBT, assumption, of_line, parse_number, question
+from sprag_study.service.reading.texts import shorten_text
+from sprag_study.service.reading.together import AMBIGUOUS_UNIT, questions
+from sprag_study.service.reading.units import QuantityError, to_float
+from sprag_study.service.spec.node import exact
+from sprag_study.service.spec.table_text import MAX_HEADING, CsvRow, Split, settled_table, split, with_units
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
-    from sprag.service.spec.node import Node
-    from sprag.worker.models import Parameter
+    from sprag_study.service.spec.node import Node
+    from sprag_study.worker.models import Parameter
 
 #: Beginnings of text that a spreadsheet would interpret as a formula.
 _FORMULA_STARTS: Final = ("=", "+", "-", "@", "\t", "\r")

@@ -16,23 +16,23 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.sentences import Amount, Part, Place, Sentence, joined
-from sprag.service.reading.catalogue import range_sentence
-from sprag.service.reading.texts import did_you_mean, quantity_text
-from sprag.service.spec.draws.unit import unit_sample
-from sprag.service.spec.formulas import Formula, FormulaError, UnknownNameError, read_formula
-from sprag.service.spec.node import Node
-from sprag.service.spec.report import Report, join
-from sprag.worker.derived import blocks, involved
-from sprag.worker.limits import MAX_DERIVED
-from sprag.worker.models.formulas import MAX_LENGTH, CircularError, evaluate, evaluation_order
-from sprag.worker.models.parameters import in_range, model_parameter
-from sprag.worker.study import Axis, Combine, Study
+from sprag_study.sentences import Amount, Part, Place, Sentence, joined
+from sprag_study.service.reading.catalogue import range_sentence
+from sprag_study.service.reading.texts import did_you_mean, quantity_text
+from sprag_study.service.spec.draws.unit import unit_sample
+from sprag_study.service.spec.formulas import Formula, FormulaError, UnknownNameError, read_formula
+from sprag_study.service.spec.node import Node
+from sprag_study.service.spec.report import Report, join
+from sprag_study.worker.derived import blocks, involved
+from sprag_study.worker.limits import MAX_DERIVED
+from sprag_study.worker.models.formulas import MAX_LENGTH, CircularError, evaluate, evaluation_order
+from sprag_study.worker.models.parameters import in_range, model_parameter
+from sprag_study.worker.study import Axis, Combine, Study
 
 if TYPE_CHECKING:
-    from sprag.service.spec.machine.machine import Machine
-    from sprag.service.spec.machine.registry import SpecPart
-    from sprag.worker.models import Parameter
+    from sprag_study.service.spec.machine.machine import Machine
+    from sprag_study.service.spec.machine.registry import SpecPart
+    from sprag_study.worker.models import Parameter
 
 HELP: Final = (
     "parameters that follow from others in every case, by path: formulas of other parameters, of numbers with their "

@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal, Union
 
-from sprag.sentences import Sentence
-from sprag.service.reading.numbers import WITHOUT_DOUBT, assumption, question, settle
-from sprag.service.reading.part_names import RUN_LABELS
-from sprag.service.spec.lists import refuse_mixed
-from sprag.service.spec.node import Node
-from sprag.service.spec.schema.quantity import Schema, object_schema, one_of, quantity_schema
-from sprag.worker.limits import (
+from sprag_study.sentences import Sentence
+from sprag_study.service.reading.numbers import WITHOUT_DOUBT, assumption, question, settle
+from sprag_study.service.reading.part_names import RUN_LABELS
+from sprag_study.service.spec.lists import refuse_mixed
+from sprag_study.service.spec.node import Node
+from sprag_study.service.spec.schema.quantity import Schema, object_schema, one_of, quantity_schema
+from sprag_study.worker.limits import (
     MAX_ORBIT_PERIODS,
     MAX_SETTLED,
     MAX_SETTLED_PERIODS,
@@ -21,7 +21,7 @@ from sprag.worker.limits import (
     MIN_SETTLED_PERIODS,
     MIN_TOLERANCE,
 )
-from sprag.worker.models import MAX_COEFFICIENTS, SETTLED, Parameter
+from sprag_study.worker.models import MAX_COEFFICIENTS, SETTLED, Parameter
 
 #: What is said about a list that is none, and what is allowed; the catalogue has these texts for the items of each.
 NO_LIST: Final = "must be a list of {items}"

@@ -6,21 +6,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.quantities import typed_unit, typed_units
-from sprag.service.reading.units import QuantityError, exact_quantity
-from sprag.service.spec.derive import with_values
-from sprag.service.spec.fields import renamed
-from sprag.service.spec.kinds.registry import without_cases
-from sprag.service.spec.kinds.tolerances import SPREAD
-from sprag.worker.models import NO_PARAMETERS
-from sprag.worker.models.parameters import parameter_of
-from sprag.worker.spread import DRIVE
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.quantities import typed_unit, typed_units
+from sprag_study.service.reading.units import QuantityError, exact_quantity
+from sprag_study.service.spec.derive import with_values
+from sprag_study.service.spec.fields import renamed
+from sprag_study.service.spec.kinds.registry import without_cases
+from sprag_study.service.spec.kinds.tolerances import SPREAD
+from sprag_study.worker.models import NO_PARAMETERS
+from sprag_study.worker.models.parameters import parameter_of
+from sprag_study.worker.spread import DRIVE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
 #: Values over which a design is run, and how far beyond its own value.
 _VALUES: Final = 41

@@ -11,24 +11,24 @@ from dataclasses import dataclass, field
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.sentences import Sentence
-from sprag.service.reading.limits import characters, quoted
-from sprag.service.reading.texts import did_you_mean
-from sprag.service.spec.derive import DERIVE, check_derived, layout, read_machine
-from sprag.service.spec.described import Record
-from sprag.service.spec.kinds.draft import Draft
-from sprag.service.spec.kinds.registry import CASES, WITH_CASES
-from sprag.service.spec.kinds.tolerances import warn_of_invalid_drives
-from sprag.service.spec.machine.registry import part_of
-from sprag.service.spec.node import Node
-from sprag.service.spec.report import Report, SpecError
-from sprag.service.spec.text import Format, load_spec
-from sprag.worker import models
-from sprag.worker.limits import MAX_NAME_LENGTH
-from sprag.worker.study import Study
+from sprag_study.sentences import Sentence
+from sprag_study.service.reading.limits import characters, quoted
+from sprag_study.service.reading.texts import did_you_mean
+from sprag_study.service.spec.derive import DERIVE, check_derived, layout, read_machine
+from sprag_study.service.spec.described import Record
+from sprag_study.service.spec.kinds.draft import Draft
+from sprag_study.service.spec.kinds.registry import CASES, WITH_CASES
+from sprag_study.service.spec.kinds.tolerances import warn_of_invalid_drives
+from sprag_study.service.spec.machine.registry import part_of
+from sprag_study.service.spec.node import Node
+from sprag_study.service.spec.report import Report, SpecError
+from sprag_study.service.spec.text import Format, load_spec
+from sprag_study.worker import models
+from sprag_study.worker.limits import MAX_NAME_LENGTH
+from sprag_study.worker.study import Study
 
 if TYPE_CHECKING:
-    from sprag.worker.models import ClutchFit
+    from sprag_study.worker.models import ClutchFit
 
 __all__ = ["VERSION", "ParsedSpec", "SpecError", "format_of", "load_spec", "parse_spec"]
 

@@ -9,25 +9,25 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.faults import Fault
-from sprag.service.reading.texts import quantity_text
-from sprag.service.spec.axes.axes import AXIS, axis_values
-from sprag.service.spec.axes.design import ANYTHING
-from sprag.service.spec.derive import read_machine
-from sprag.service.spec.described import Listed, Record
-from sprag.service.spec.document import ParsedSpec, parse_spec
-from sprag.service.spec.kinds.registry import without_cases
-from sprag.service.spec.kinds.sweep import sweep_of
-from sprag.service.spec.kinds.tolerances import SPREAD
-from sprag.service.spec.machine.registry import part_of
-from sprag.service.spec.node import Node
-from sprag.service.spec.report import Report, SpecError
-from sprag.worker.directions import SWEEP
-from sprag.worker.limits import MAX_AXES
-from sprag.worker.study import without_drives
+from sprag_study.service.faults import Fault
+from sprag_study.service.reading.texts import quantity_text
+from sprag_study.service.spec.axes.axes import AXIS, axis_values
+from sprag_study.service.spec.axes.design import ANYTHING
+from sprag_study.service.spec.derive import read_machine
+from sprag_study.service.spec.described import Listed, Record
+from sprag_study.service.spec.document import ParsedSpec, parse_spec
+from sprag_study.service.spec.kinds.registry import without_cases
+from sprag_study.service.spec.kinds.sweep import sweep_of
+from sprag_study.service.spec.kinds.tolerances import SPREAD
+from sprag_study.service.spec.machine.registry import part_of
+from sprag_study.service.spec.node import Node
+from sprag_study.service.spec.report import Report, SpecError
+from sprag_study.worker.directions import SWEEP
+from sprag_study.worker.limits import MAX_AXES
+from sprag_study.worker.study import without_drives
 
 if TYPE_CHECKING:
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
 _AXES: Final = (
     "further values of axes of a grid; a parameter that did not vary becomes an axis of the base's value and these"

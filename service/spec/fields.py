@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from sprag.worker.limits import MAX_NAME_LENGTH
+from sprag_study.worker.limits import MAX_NAME_LENGTH
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -14,12 +14,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Final
 
-from sprag.sentences import Part, Sentence, Typed, joined, plural
-from sprag.service.faults import Code
-from sprag.service.languages import N_
-from sprag.service.reading.cyrillic import latin
-from sprag.service.reading.units import QuantityError, is_unit, measure, plain_signs, to_float
-from sprag.worker.models.formulas import MAX_LENGTH, RESERVED, Expression, ExpressionError, Node
+from sprag_study.sentences import Part, Sentence, Typed, joined, plural
+from sprag_study.service.faults import Code
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.cyrillic import latin
+from sprag_study.service.reading.units import QuantityError, is_unit, measure, plain_signs, to_float
+from sprag_study.worker.models.formulas import MAX_LENGTH, RESERVED, Expression, ExpressionError, Node
 
 #: Powers of gram, meter, second and radian, of hertz ("cycle") and of the number pi; None for the number 0, which has
 #: any unit.

@@ -6,13 +6,13 @@ import unicodedata
 from dataclasses import dataclass
 from typing import Any, Final
 
-from sprag.sentences import Sentence
-from sprag.service.faults import Code
-from sprag.service.reading.limits import printable_line
-from sprag.service.spec.described import Described, Listed, Record
-from sprag.service.spec.node import Node
-from sprag.service.spec.report import Report
-from sprag.worker.limits import MAX_NAME_LENGTH, MAX_NOTES_LENGTH, MAX_TAG_LENGTH, MAX_TAGS
+from sprag_study.sentences import Sentence
+from sprag_study.service.faults import Code
+from sprag_study.service.reading.limits import printable_line
+from sprag_study.service.spec.described import Described, Listed, Record
+from sprag_study.service.spec.node import Node
+from sprag_study.service.spec.report import Report
+from sprag_study.worker.limits import MAX_NAME_LENGTH, MAX_NOTES_LENGTH, MAX_TAG_LENGTH, MAX_TAGS
 
 _TAG: Final[dict[str, Any]] = {"type": "string", "minLength": 1, "maxLength": MAX_TAG_LENGTH}
 _TAG_ALLOWED: Final = Sentence("{low} to {high} printable characters without a comma", low=1, high=MAX_TAG_LENGTH)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sprag.sentences import Place
-from sprag.service.reading.numbers import assumption, settle, settled
-from sprag.service.reading.printed import could_be_values
-from sprag.service.reading.ranges import could_be_several
-from sprag.service.reading.together import AMBIGUOUS_UNIT, questions, split_list, with_last_unit
-from sprag.service.spec.node import Node
+from sprag_study.sentences import Place
+from sprag_study.service.reading.numbers import assumption, settle, settled
+from sprag_study.service.reading.printed import could_be_values
+from sprag_study.service.reading.ranges import could_be_several
+from sprag_study.service.reading.together import AMBIGUOUS_UNIT, questions, split_list, with_last_unit
+from sprag_study.service.spec.node import Node
 
 
 def refuse_mixed(nodes: Sequence[Node], unit: str | Sequence[str]) -> bool:

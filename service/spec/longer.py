@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.spec.axes.blocks import as_axes, chosen, first_rows
-from sprag.service.spec.fields import renamed
-from sprag.service.spec.kinds.registry import without_cases
-from sprag.service.spec.run import SETTLED_FIELDS, TIMED_FIELDS
-from sprag.worker.limits import MAX_RUN_PERIODS, MAX_SETTLED_PERIODS
-from sprag.worker.models import SETTLED, is_settled
-from sprag.worker.spread import DRIVE
-from sprag.worker.study import Axis
+from sprag_study.service.spec.axes.blocks import as_axes, chosen, first_rows
+from sprag_study.service.spec.fields import renamed
+from sprag_study.service.spec.kinds.registry import without_cases
+from sprag_study.service.spec.run import SETTLED_FIELDS, TIMED_FIELDS
+from sprag_study.worker.limits import MAX_RUN_PERIODS, MAX_SETTLED_PERIODS
+from sprag_study.worker.models import SETTLED, is_settled
+from sprag_study.worker.spread import DRIVE
+from sprag_study.worker.study import Axis
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
 #: Default factor on the periods of a search or the duration of a run.
 TIMES: Final = 4

@@ -17,13 +17,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.sentences import Amount, Sentence, WarningText, plural
-from sprag.service.faults import Fault, FaultError
-from sprag.service.languages import N_
-from sprag.service.reading.numbers import WITHOUT_DOUBT, assumption, is_ambiguous, of_line, parse_number, question
-from sprag.service.reading.units import QuantityError
-from sprag.service.spec.csv_text import not_csv
-from sprag.service.spec.table_text import (
+from sprag_study.sentences import Amount, Sentence, WarningText, plural
+from sprag_study.service.faults import Fault, FaultError
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.numbers import WITHOUT_DOUBT, assumption, is_ambiguous, of_line, parse_number, question
+from sprag_study.service.reading.units import QuantityError
+from sprag_study.service.spec.csv_text import not_csv
+from sprag_study.service.spec.table_text import (
     CsvRow,
     Split,
     lines_of,
@@ -31,7 +31,7 @@ from sprag.service.spec.table_text import (
     split,
     with_units,
 )
-from sprag.worker.limits import MAX_CLUTCH_ROWS
+from sprag_study.worker.limits import MAX_CLUTCH_ROWS
 
 #: Most faults reported for one file; a file of another kind would have one in every line.
 _MAX_PROBLEMS = 20

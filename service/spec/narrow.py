@@ -6,19 +6,19 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.service.spec.axes.axes import SWEPT
-from sprag.service.spec.fields import renamed
-from sprag.service.spec.kinds.registry import without_cases
-from sprag.service.spec.kinds.sweep import sweep_of
-from sprag.worker.directions import DIRECTIONS, DOWN
-from sprag.worker.limits import NARROW_STEPS
+from sprag_study.service.spec.axes.axes import SWEPT
+from sprag_study.service.spec.fields import renamed
+from sprag_study.service.spec.kinds.registry import without_cases
+from sprag_study.service.spec.kinds.sweep import sweep_of
+from sprag_study.worker.directions import DIRECTIONS, DOWN
+from sprag_study.worker.limits import NARROW_STEPS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
 _SUFFIX: Final = ", narrowed"
 

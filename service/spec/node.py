@@ -6,18 +6,25 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.sentences import Amount, Sentence, plural
-from sprag.service.reading.catalogue import range_sentence
-from sprag.service.reading.limits import one_of, quoted, span
-from sprag.service.reading.texts import did_you_mean
-from sprag.service.reading.units import PERIOD_NAMES, QuantityError, example, parse_exact, split_quantity, to_float
-from sprag.service.spec.report import Report, join
-from sprag.service.spec.shares import share_of
+from sprag_study.sentences import Amount, Sentence, plural
+from sprag_study.service.reading.catalogue import range_sentence
+from sprag_study.service.reading.limits import one_of, quoted, span
+from sprag_study.service.reading.texts import did_you_mean
+from sprag_study.service.reading.units import (
+    PERIOD_NAMES,
+    QuantityError,
+    example,
+    parse_exact,
+    split_quantity,
+    to_float,
+)
+from sprag_study.service.spec.report import Report, join
+from sprag_study.service.spec.shares import share_of
 
 if TYPE_CHECKING:
-    from sprag.service.faults import Code
-    from sprag.service.spec.machine.machine import Machine
-    from sprag.worker.models import Parameter
+    from sprag_study.service.faults import Code
+    from sprag_study.service.spec.machine.machine import Machine
+    from sprag_study.worker.models import Parameter
 
 _ITSELF: Final = object()
 

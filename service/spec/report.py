@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from sprag.sentences import Place, Sentence, WarningText, plural
-from sprag.service.faults import Code, Fault, FaultError, WarningCode
-from sprag.service.reading.texts import did_you_mean, shorten, shorten_text
-from sprag.worker.limits import MAX_PROBLEMS
+from sprag_study.sentences import Place, Sentence, WarningText, plural
+from sprag_study.service.faults import Code, Fault, FaultError, WarningCode
+from sprag_study.service.reading.texts import did_you_mean, shorten, shorten_text
+from sprag_study.worker.limits import MAX_PROBLEMS
 
 if TYPE_CHECKING:
-    from sprag.service.spec.machine.machine import Machine
-    from sprag.worker.models import ResultInfo
+    from sprag_study.service.spec.machine.machine import Machine
+    from sprag_study.worker.models import ResultInfo
 
 
 class SpecError(FaultError):

@@ -6,19 +6,26 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.sentences import Amount, Sentence, plural
-from sprag.service.languages import N_
-from sprag.service.reading.units import PERIOD_NAMES, QuantityError, exact_number, parse_exact, split_quantity, to_float
-from sprag.service.spec.described import ANY_RUN, DURATION, SETTLED_RUN, Record
-from sprag.service.spec.lists import refuse_mixed
-from sprag.worker.limits import MAX_RUN_PERIODS
-from sprag.worker.models import MEANS_FROM_PERIODS
+from sprag_study.sentences import Amount, Sentence, plural
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.units import (
+    PERIOD_NAMES,
+    QuantityError,
+    exact_number,
+    parse_exact,
+    split_quantity,
+    to_float,
+)
+from sprag_study.service.spec.described import ANY_RUN, DURATION, SETTLED_RUN, Record
+from sprag_study.service.spec.lists import refuse_mixed
+from sprag_study.worker.limits import MAX_RUN_PERIODS
+from sprag_study.worker.models import MEANS_FROM_PERIODS
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from sprag.service.spec.node import Node
+    from sprag_study.service.spec.node import Node
 
 #: Fields of settled runs only, and of timed runs only.
 SETTLED_FIELDS: Final = tuple(SETTLED_RUN)

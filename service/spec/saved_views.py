@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import Any, Final
 from urllib.parse import parse_qsl, urlencode
 
-from sprag.sentences import Sentence
-from sprag.service.reading.limits import characters, span
-from sprag.service.spec.described import Described, Record
-from sprag.service.spec.labels import NAME, read_line, text_code
-from sprag.service.spec.node import Node
-from sprag.service.spec.report import Report
-from sprag.worker.limits import MAX_NAME_LENGTH, MAX_REPORT_FIGURES, MAX_VIEW_QUERY
+from sprag_study.sentences import Sentence
+from sprag_study.service.reading.limits import characters, span
+from sprag_study.service.spec.described import Described, Record
+from sprag_study.service.spec.labels import NAME, read_line, text_code
+from sprag_study.service.spec.node import Node
+from sprag_study.service.spec.report import Report
+from sprag_study.worker.limits import MAX_NAME_LENGTH, MAX_REPORT_FIGURES, MAX_VIEW_QUERY
 
 #: Pages whose views can be figures of the report.
 FIGURES: Final = ("curves", "map")

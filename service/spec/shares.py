@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from sprag.service.reading.units import QuantityError, split_quantity, to_float
+from sprag_study.service.reading.units import QuantityError, split_quantity, to_float
 
 
 def share_of(value: object) -> float | None:

@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.service.reading.numbers import has_doubtful_point, with_decimal, with_decimals
-from sprag.service.reading.printed import could_be_values, keyboard
-from sprag.service.reading.together import AMBIGUOUS_UNIT, split_list
-from sprag.service.spec.csv_text import has_units
-from sprag.service.spec.document import parse_spec
-from sprag.service.spec.report import SpecError
+from sprag_study.service.reading.numbers import has_doubtful_point, with_decimal, with_decimals
+from sprag_study.service.reading.printed import could_be_values, keyboard
+from sprag_study.service.reading.together import AMBIGUOUS_UNIT, split_list
+from sprag_study.service.spec.csv_text import has_units
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.report import SpecError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from sprag.service.faults import Fault
-    from sprag.worker.study import Study
+    from sprag_study.service.faults import Fault
+    from sprag_study.worker.study import Study
 
 #: Numbers farther apart than this (relative) were read differently, and not only computed by another version.
 _APART: Final = 1e-3

@@ -14,8 +14,8 @@ import itertools
 import re
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from sprag.service.reading.numbers import settle, settled
-from sprag.service.reading.units import QuantityError, measure
+from sprag_study.service.reading.numbers import settle, settled
+from sprag_study.service.reading.units import QuantityError, measure
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence

@@ -8,11 +8,11 @@ import re
 import tomllib
 from typing import Any, Final, Literal
 
-from sprag.sentences import Sentence, plural
-from sprag.service.faults import Fault
-from sprag.service.languages import N_
-from sprag.service.spec.report import Report, SpecError, join
-from sprag.worker.limits import MAX_BODY_BYTES, MAX_DEPTH, MAX_INTEGER_DIGITS
+from sprag_study.sentences import Sentence, plural
+from sprag_study.service.faults import Fault
+from sprag_study.service.languages import N_
+from sprag_study.service.spec.report import Report, SpecError, join
+from sprag_study.worker.limits import MAX_BODY_BYTES, MAX_DEPTH, MAX_INTEGER_DIGITS
 
 _LONGEST_BITS: Final = math.ceil(MAX_INTEGER_DIGITS * math.log2(10))
 

@@ -10,14 +10,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.sentences import Amount, Place, Sentence
-from sprag.service.spec.axes.axes import varied_values
-from sprag.service.spec.report import Report
-from sprag.worker.derived import distinct_values, involved
-from sprag.worker.models import machine_shaft
-from sprag.worker.models.parameters import parameter_of
-from sprag.worker.models.starts import count_of, has_starts
-from sprag.worker.study import Axis, Study
+from sprag_study.sentences import Amount, Place, Sentence
+from sprag_study.service.spec.axes.axes import varied_values
+from sprag_study.service.spec.report import Report
+from sprag_study.worker.derived import distinct_values, involved
+from sprag_study.worker.models import machine_shaft
+from sprag_study.worker.models.parameters import parameter_of
+from sprag_study.worker.models.starts import count_of, has_starts
+from sprag_study.worker.study import Axis, Study
 
 #: Up to this number all combinations of the axes involved are checked; beyond it, only the ends of the axes.
 _MOST_COMBINATIONS: Final = 100_000

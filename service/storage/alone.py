@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
-from sprag.migrations import REVISIONS
-from sprag.service.storage import deployment, maintenance
-from sprag.service.storage.database.session import Session
-from sprag.service.storage.errors import in_use
-from sprag.service.storage.tables import HEAD_REVISION
+from sprag_study.migrations import REVISIONS
+from sprag_study.service.storage import deployment, maintenance
+from sprag_study.service.storage.database.session import Session
+from sprag_study.service.storage.errors import in_use
+from sprag_study.service.storage.tables import HEAD_REVISION
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -11,7 +11,7 @@ from threading import Lock
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
-    from sprag.service.storage.work.dispatchers import Dispatchers
+    from sprag_study.service.storage.work.dispatchers import Dispatchers
 
 _LOG = logging.getLogger("sprag.clock")
 

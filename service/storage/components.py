@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import sqlalchemy as sa
 
-from sprag.service.actor import acting
-from sprag.service.spec.components import Component
-from sprag.service.storage.errors import ComponentNotFoundError, TooManyComponentsError
-from sprag.service.storage.part import Part, moment
-from sprag.service.storage.people.audit import edition_of, note, require_edition, require_own
-from sprag.service.storage.people.pools import pool_of
-from sprag.service.storage.tables import METADATA
-from sprag.worker.limits import MAX_COMPONENTS
+from sprag_study.service.actor import acting
+from sprag_study.service.spec.components import Component
+from sprag_study.service.storage.errors import ComponentNotFoundError, TooManyComponentsError
+from sprag_study.service.storage.part import Part, moment
+from sprag_study.service.storage.people.audit import edition_of, note, require_edition, require_own
+from sprag_study.service.storage.people.pools import pool_of
+from sprag_study.service.storage.tables import METADATA
+from sprag_study.worker.limits import MAX_COMPONENTS
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable

@@ -16,16 +16,16 @@ from typing import TYPE_CHECKING, Final
 
 import sqlalchemy as sa
 
-from sprag.service.storage.database.sqlite_files import file_system_of
-from sprag.service.storage.part import Part, SystemClock, micros_of
-from sprag.service.storage.people.audit import note
-from sprag.service.storage.schedules.tables import SCHEDULES
-from sprag.service.storage.tables import METADATA
+from sprag_study.service.storage.database.sqlite_files import file_system_of
+from sprag_study.service.storage.part import Part, SystemClock, micros_of
+from sprag_study.service.storage.people.audit import note
+from sprag_study.service.storage.schedules.tables import SCHEDULES
+from sprag_study.service.storage.tables import METADATA
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from sprag.service.storage.database.session import Session
+    from sprag_study.service.storage.database.session import Session
 
     #: What a database is told by, such as {"kind": "file", "number": "42"}.
     Place = Mapping[str, str]

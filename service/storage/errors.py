@@ -1,7 +1,7 @@
 """Errors of the database, each with a one-sentence message."""
 
-from sprag.sentences import Sentence
-from sprag.worker.ports import StoreError, StoreFullError
+from sprag_study.sentences import Sentence
+from sprag_study.worker.ports import StoreError, StoreFullError
 
 __all__ = [
     "CREATED_BY",

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import sqlalchemy as sa
 
-from sprag.service.storage.part import Part, micros_of, moment
-from sprag.service.storage.tables import CHUNKS, DISPATCHERS, ENDED, ENDINGS, HELD_AT_DEADLINE, STUDIES
-from sprag.worker.states import ChunkState
+from sprag_study.service.storage.part import Part, micros_of, moment
+from sprag_study.service.storage.tables import CHUNKS, DISPATCHERS, ENDED, ENDINGS, HELD_AT_DEADLINE, STUDIES
+from sprag_study.worker.states import ChunkState
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

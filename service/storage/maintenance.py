@@ -11,22 +11,22 @@ from typing import TYPE_CHECKING
 
 import sqlalchemy as sa
 
-from sprag.migrations import REVISIONS, bring_up
-from sprag.service.stale_files import mark, sweep
-from sprag.service.storage import components, saved_views  # noqa: F401 - their tables are made, too
-from sprag.service.storage.database.private_files import create_private, sync_folder
-from sprag.service.storage.database.sqlite_files import sqlite_version, sqlite_warning
-from sprag.service.storage.deployment import settle
-from sprag.service.storage.errors import CREATED_BY, DatabaseError, SchemaError
-from sprag.service.storage.part import SystemClock, micros_of
-from sprag.service.storage.people.audit import note
-from sprag.service.storage.rows.digests import Digests
-from sprag.service.storage.rows.order import Orders
-from sprag.service.storage.studies.records import CheckReport
-from sprag.service.storage.tables import HEAD_REVISION, all_tables
+from sprag_study.migrations import REVISIONS, bring_up
+from sprag_study.service.stale_files import mark, sweep
+from sprag_study.service.storage import components, saved_views  # noqa: F401 - their tables are made, too
+from sprag_study.service.storage.database.private_files import create_private, sync_folder
+from sprag_study.service.storage.database.sqlite_files import sqlite_version, sqlite_warning
+from sprag_study.service.storage.deployment import settle
+from sprag_study.service.storage.errors import CREATED_BY, DatabaseError, SchemaError
+from sprag_study.service.storage.part import SystemClock, micros_of
+from sprag_study.service.storage.people.audit import note
+from sprag_study.service.storage.rows.digests import Digests
+from sprag_study.service.storage.rows.order import Orders
+from sprag_study.service.storage.studies.records import CheckReport
+from sprag_study.service.storage.tables import HEAD_REVISION, all_tables
 
 if TYPE_CHECKING:
-    from sprag.service.storage.database.session import Session
+    from sprag_study.service.storage.database.session import Session
 
 #: Largest database, in bytes, that is checked at every start; the check takes less than a second.
 CHECKED_BYTES = 256_000_000

@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
-from sprag.service.storage import deployment, maintenance
-from sprag.service.storage.database.lock import DispatcherLock
-from sprag.service.storage.errors import DatabaseError
-from sprag.service.storage.tables import HEAD_REVISION, all_tables
+from sprag_study.service.storage import deployment, maintenance
+from sprag_study.service.storage.database.lock import DispatcherLock
+from sprag_study.service.storage.errors import DatabaseError
+from sprag_study.service.storage.tables import HEAD_REVISION, all_tables
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator, Sequence
 
-    from sprag.service.storage.database.server_lock import ServerLock
-    from sprag.service.storage.database.session import Session
+    from sprag_study.service.storage.database.server_lock import ServerLock
+    from sprag_study.service.storage.database.session import Session
 
     Row = tuple[Any, ...]
     #: Rows after the first key (None: from the beginning) up to the second one (None: to the end).
@@ -85,7 +85,7 @@ class TableOf:
             return
         columns = self._columns(connection)
         if not replace and connection.dialect.name == "postgresql":
-            from sprag.service.storage.database.postgres import copy_in
+            from sprag_study.service.storage.database.postgres import copy_in
 
             copy_in(connection, f"{self._quoted(connection, self.name)} ({columns})", rows)
             return

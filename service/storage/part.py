@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING, Any, Concatenate, Final, ParamSpec, TypeVar
 
 import sqlalchemy as sa
 
-from sprag.service.storage.database.reserve import spend, spend_share
-from sprag.service.storage.database.session import READ
-from sprag.service.storage.errors import DatabaseFullError, StudyNotFoundError
-from sprag.service.storage.stored_sentences import written
-from sprag.service.storage.tables import CHUNKS, RECORD_COLUMNS, STUDIES
-from sprag.worker.states import ChunkState, StudyEvent, StudyState, follow
+from sprag_study.service.storage.database.reserve import spend, spend_share
+from sprag_study.service.storage.database.session import READ
+from sprag_study.service.storage.errors import DatabaseFullError, StudyNotFoundError
+from sprag_study.service.storage.stored_sentences import written
+from sprag_study.service.storage.tables import CHUNKS, RECORD_COLUMNS, STUDIES
+from sprag_study.worker.states import ChunkState, StudyEvent, StudyState, follow
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
     from pathlib import Path
 
-    from sprag.service.storage.database.session import Session
-    from sprag.worker.ports import Chunk, Clock
+    from sprag_study.service.storage.database.session import Session
+    from sprag_study.worker.ports import Chunk, Clock
 
 _A = ParamSpec("_A")
 _R = TypeVar("_R")

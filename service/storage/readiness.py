@@ -6,18 +6,18 @@ from contextlib import suppress
 from threading import Lock
 from typing import TYPE_CHECKING, Final
 
-from sprag.sentences import Sentence
-from sprag.service.languages import recorded
-from sprag.service.storage.clock_watch import clock_problem
-from sprag.service.storage.errors import DatabaseError
-from sprag.service.storage.part import SILENT_SECONDS
-from sprag.service.storage.work.dispatchers import TAKE_OVER_SECONDS
-from sprag.worker.ports import StoreError
+from sprag_study.sentences import Sentence
+from sprag_study.service.languages import recorded
+from sprag_study.service.storage.clock_watch import clock_problem
+from sprag_study.service.storage.errors import DatabaseError
+from sprag_study.service.storage.part import SILENT_SECONDS
+from sprag_study.service.storage.work.dispatchers import TAKE_OVER_SECONDS
+from sprag_study.worker.ports import StoreError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from sprag.service.storage.store import Store
+    from sprag_study.service.storage.store import Store
 
 #: Seconds that others may hold the write lock: far longer than any write transaction of Sprag.
 LOCKED_SECONDS: Final = 5.0

@@ -8,22 +8,22 @@ from typing import TYPE_CHECKING, Any
 
 import sqlalchemy as sa
 
-from sprag.sentences import Sentence
-from sprag.service.actor import acting
-from sprag.service.faults import Fault, FaultError
-from sprag.service.spec.saved_views import View
-from sprag.service.storage.errors import TooManyViewsError, ViewNotFoundError
-from sprag.service.storage.part import Part, change_row, moment, row_of
-from sprag.service.storage.people.audit import edition_of, note, require_edition, require_own
-from sprag.service.storage.people.pools import pool_of
-from sprag.service.storage.tables import METADATA, STUDIES
-from sprag.worker.limits import MAX_REPORT_FIGURES, MAX_VIEWS
+from sprag_study.sentences import Sentence
+from sprag_study.service.actor import acting
+from sprag_study.service.faults import Fault, FaultError
+from sprag_study.service.spec.saved_views import View
+from sprag_study.service.storage.errors import TooManyViewsError, ViewNotFoundError
+from sprag_study.service.storage.part import Part, change_row, moment, row_of
+from sprag_study.service.storage.people.audit import edition_of, note, require_edition, require_own
+from sprag_study.service.storage.people.pools import pool_of
+from sprag_study.service.storage.tables import METADATA, STUDIES
+from sprag_study.worker.limits import MAX_REPORT_FIGURES, MAX_VIEWS
 
 if TYPE_CHECKING:
     from collections.abc import Collection
     from datetime import datetime
 
-    from sprag.service.spec.saved_views import ViewChange
+    from sprag_study.service.spec.saved_views import ViewChange
 
 SAVED_VIEWS = sa.Table(
     "saved_views",

@@ -4,35 +4,35 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Self
 
-from sprag.service.storage import maintenance
-from sprag.service.storage.components import Components
-from sprag.service.storage.database.session import Session
-from sprag.service.storage.deployment import Deployment
-from sprag.service.storage.figures import Totals
-from sprag.service.storage.part import SystemClock
-from sprag.service.storage.people.audit import Audit
-from sprag.service.storage.people.people import People
-from sprag.service.storage.rows.digests import Digests
-from sprag.service.storage.rows.order import Orders
-from sprag.service.storage.rows.reuse import Reuse
-from sprag.service.storage.rows.rows import Rows
-from sprag.service.storage.saved_views import Views
-from sprag.service.storage.schedules.reports import Reports
-from sprag.service.storage.schedules.runs import Runs
-from sprag.service.storage.schedules.schedules import Schedules
-from sprag.service.storage.studies.purging import Purging
-from sprag.service.storage.studies.studies import Studies
-from sprag.service.storage.work.dispatchers import Dispatchers
-from sprag.service.storage.work.room import Room
-from sprag.service.storage.work.work import Work
-from sprag.worker.chunking import Chunking
+from sprag_study.service.storage import maintenance
+from sprag_study.service.storage.components import Components
+from sprag_study.service.storage.database.session import Session
+from sprag_study.service.storage.deployment import Deployment
+from sprag_study.service.storage.figures import Totals
+from sprag_study.service.storage.part import SystemClock
+from sprag_study.service.storage.people.audit import Audit
+from sprag_study.service.storage.people.people import People
+from sprag_study.service.storage.rows.digests import Digests
+from sprag_study.service.storage.rows.order import Orders
+from sprag_study.service.storage.rows.reuse import Reuse
+from sprag_study.service.storage.rows.rows import Rows
+from sprag_study.service.storage.saved_views import Views
+from sprag_study.service.storage.schedules.reports import Reports
+from sprag_study.service.storage.schedules.runs import Runs
+from sprag_study.service.storage.schedules.schedules import Schedules
+from sprag_study.service.storage.studies.purging import Purging
+from sprag_study.service.storage.studies.studies import Studies
+from sprag_study.service.storage.work.dispatchers import Dispatchers
+from sprag_study.service.storage.work.room import Room
+from sprag_study.service.storage.work.work import Work
+from sprag_study.worker.chunking import Chunking
 
 if TYPE_CHECKING:
     from pathlib import Path
     from types import TracebackType
 
-    from sprag.service.storage.studies.records import CheckReport
-    from sprag.worker.ports import Clock
+    from sprag_study.service.storage.studies.records import CheckReport
+    from sprag_study.worker.ports import Clock
 
 
 class Store:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from sprag.sentences import Sentence, WarningText, sentence_of
+from sprag_study.sentences import Sentence, WarningText, sentence_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -6,9 +6,9 @@ from typing import Final
 
 import sqlalchemy as sa
 
-from sprag.migrations import REVISIONS
-from sprag.worker import models
-from sprag.worker.states import TERMINAL, ChunkState
+from sprag_study.migrations import REVISIONS
+from sprag_study.worker import models
+from sprag_study.worker.states import TERMINAL, ChunkState
 
 #: Revision of the schema below.
 HEAD_REVISION: Final = REVISIONS[-1]
@@ -54,9 +54,9 @@ STUDIES = sa.Table(
     sa.Column("rank", sa.Integer, nullable=False, server_default="0"),
     # What a paused study waits for (`WAITS_FOR_ROOM` and below); NULL where the user or a fault paused it.
     sa.Column("waits_for", sa.String(12)),
-    # Equal for studies that may share cases (`sprag.worker.reuse`).
+    # Equal for studies that may share cases (`sprag_study.worker.reuse`).
     sa.Column("kin_hash", sa.String(64), nullable=False, server_default=""),
-    # Whether its cases are in `CASE_KEYS` (`sprag.service.storage.rows.case_keys`).
+    # Whether its cases are in `CASE_KEYS` (`sprag_study.service.storage.rows.case_keys`).
     sa.Column("keyed", sa.Integer, nullable=False, server_default="0"),
     # 1: every case is run, without reuse of other studies.
     sa.Column("fresh", sa.Integer, nullable=False, server_default="0"),
@@ -65,10 +65,10 @@ STUDIES = sa.Table(
     # Deadline at which the study is held; NULL where it has none.
     sa.Column("finish_by", sa.BigInteger),
     # 1: it is run coarse to fine, `LINE_BY_LINE`: line by line; its chunks are ranges of positions in that order
-    # (`sprag.worker.order`).
+    # (`sprag_study.worker.order`).
     sa.Column("coarse", sa.Integer, nullable=False, server_default="0"),
-    # Fingerprint of the processes that computed its rows (`sprag.worker.fingerprint`); NULL: no rows yet, "": unknown,
-    # or several.
+    # Fingerprint of the processes that computed its rows (`sprag_study.worker.fingerprint`); NULL: no rows yet, "":
+    # unknown, or several.
     sa.Column("fingerprint", sa.String(64)),
     # Of a study that chooses its own cases: more cases and rounds than this it never has; NULL for any other.
     sa.Column("most_cases", sa.Integer),
@@ -85,13 +85,13 @@ STUDIES = sa.Table(
     # Until then a deleted study can be restored; 0, or NULL in those deleted before revision 0023: its rows are being
     # removed.
     sa.Column("purge_at", sa.BigInteger),
-    # Name, tags and notes as they are searched (`sprag.service.storage.studies.listing`).
+    # Name, tags and notes as they are searched (`sprag_study.service.storage.studies.listing`).
     sa.Column("search", sa.Text, nullable=False, server_default=""),
     # Epoch of the dispatcher to which it belongs; NULL: to none, so any of them may take it.
     sa.Column("dispatcher", sa.Integer),
-    # Of its inputs (`sprag.service.storage.studies.study_digests`); NULL: from before revision 0039.
+    # Of its inputs (`sprag_study.service.storage.studies.study_digests`); NULL: from before revision 0039.
     sa.Column("digest", sa.BigInteger),
-    # The values of `reason` (`sprag.service.storage.stored_sentences`).
+    # The values of `reason` (`sprag_study.service.storage.stored_sentences`).
     sa.Column("reason_values", sa.Text),
     sa.Index("ix_studies_kin_hash_keyed", "kin_hash", "keyed"),
     sqlite_autoincrement=True,
@@ -139,7 +139,7 @@ CHUNKS = sa.Table(
     # rows copied from other studies the hosts there, several with commas between them.
     sa.Column("host", sa.String(255)),
     sa.Column("fingerprint", sa.String(64)),
-    # Of its rows (`sprag.service.storage.rows.digests`); NULL: no rows yet, or from before revision 0036.
+    # Of its rows (`sprag_study.service.storage.rows.digests`); NULL: no rows yet, or from before revision 0036.
     sa.Column("digest", sa.BigInteger),
     sa.Index("ix_chunks_study_state_finished_at", "study", "state", "finished_at"),
     sqlite_with_rowid=False,
@@ -172,7 +172,7 @@ ENDINGS = sa.Table(
 IDEMPOTENCY_KEYS = sa.Table(
     "idempotency_keys",
     METADATA,
-    # Who sent it (`sprag.service.actor.share_of`): each has keys of its own; "" for nobody.
+    # Who sent it (`sprag_study.service.actor.share_of`): each has keys of its own; "" for nobody.
     sa.Column("sender", sa.String(90), primary_key=True, server_default=""),
     sa.Column("key", sa.String(255), primary_key=True),
     sa.Column("body_hash", sa.String(64), nullable=False),
@@ -186,7 +186,7 @@ DISPATCHERS = sa.Table(
     METADATA,
     sa.Column("epoch", sa.Integer, primary_key=True, autoincrement=False),
     sa.Column("owner", sa.Text, nullable=False),
-    # Of its process and its workers (`sprag.worker.fingerprint`); "": from before revision 0028.
+    # Of its process and its workers (`sprag_study.worker.fingerprint`); "": from before revision 0028.
     sa.Column("fingerprint", sa.String(64), nullable=False),
     sa.Column("started_at", sa.BigInteger, nullable=False),
     sa.Column("heartbeat_at", sa.BigInteger, nullable=False),
@@ -194,11 +194,12 @@ DISPATCHERS = sa.Table(
     sa.Column("ended_at", sa.BigInteger),
     # The last time at which the clock was trusted, the same in all rows; NULL before the first check.
     sa.Column("clock_at", sa.BigInteger),
-    # What it last reported of its workers, as JSON data (`sprag.worker.reports`); NULL before its first heartbeat.
+    # What it last reported of its workers, as JSON data (`sprag_study.worker.reports`); NULL before its first
+    # heartbeat.
     sa.Column("report", sa.Text),
 )
 
-#: Keys of cases (`sprag.worker.case_keys`) and the studies that have them, whether or not they have been run.
+#: Keys of cases (`sprag_study.worker.case_keys`) and the studies that have them, whether or not they have been run.
 CASE_KEYS = sa.Table(
     "case_keys",
     METADATA,

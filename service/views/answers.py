@@ -6,28 +6,28 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from sprag.service.answers import key as m
-from sprag.service.faults import refused
-from sprag.service.figures.answers import answers_figure
-from sprag.service.figures.pictures import Picture, require_drawable
-from sprag.service.results.curve_cases import select
-from sprag.service.results.curves import CurveQuery
-from sprag.service.results.key_answer_words import answers_csv, report
-from sprag.service.results.key_answers import StudyAnswers, answers_query, find_answers, read_point
-from sprag.service.storage.studies.records import CaseColumns
-from sprag.service.views import study_view
-from sprag.service.views.curves import completed_query
-from sprag.service.views.study_questions import ANSWERS, AnswersQuestion
-from sprag.service.views.study_view import StudyAnswer, StudyView
-from sprag.worker import models
+from sprag_study.service.answers import key as m
+from sprag_study.service.faults import refused
+from sprag_study.service.figures.answers import answers_figure
+from sprag_study.service.figures.pictures import Picture, require_drawable
+from sprag_study.service.results.curve_cases import select
+from sprag_study.service.results.curves import CurveQuery
+from sprag_study.service.results.key_answer_words import answers_csv, report
+from sprag_study.service.results.key_answers import StudyAnswers, answers_query, find_answers, read_point
+from sprag_study.service.storage.studies.records import CaseColumns
+from sprag_study.service.views import study_view
+from sprag_study.service.views.curves import completed_query
+from sprag_study.service.views.study_questions import ANSWERS, AnswersQuestion
+from sprag_study.service.views.study_view import StudyAnswer, StudyView
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.figures.figure import Figure
-    from sprag.service.reading.reader import Reading
-    from sprag.service.views.library import Library
-    from sprag.worker.study import Study
+    from sprag_study.service.figures.figure import Figure
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.service.views.library import Library
+    from sprag_study.worker.study import Study
 
 
 @dataclass(frozen=True, slots=True)

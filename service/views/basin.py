@@ -8,33 +8,33 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.sentences import Sentence, Typed
-from sprag.service.answers.results import BasinData, RegimeRow
-from sprag.service.exports import table_csv
-from sprag.service.faults import FaultError, parameter_error
-from sprag.service.figures.basin import basin_figure
-from sprag.service.languages import N_, _
-from sprag.service.reading.catalogue import range_sentence
-from sprag.service.reading.reader import Phrase, term
-from sprag.service.reading.texts import quantity_text
-from sprag.service.reading.units import QuantityError, typed_value
-from sprag.service.reading.wording import percent
-from sprag.service.results.selection import ends_of_range
-from sprag.service.results.start_states import refuse_impossible
-from sprag.service.views.branch import named
-from sprag.service.views.case_questions import BASIN, BasinQuestion
-from sprag.service.views.case_view import CaseAnswer, CaseView
-from sprag.service.views.setting import Offered
-from sprag.service.views.shown import Column, Shown, ShownTable
-from sprag.worker import models
-from sprag.worker.models import Basin
-from sprag.worker.models.common import case_machine
-from sprag.worker.models.starts import STARTS, has_starts
+from sprag_study.sentences import Sentence, Typed
+from sprag_study.service.answers.results import BasinData, RegimeRow
+from sprag_study.service.exports import table_csv
+from sprag_study.service.faults import FaultError, parameter_error
+from sprag_study.service.figures.basin import basin_figure
+from sprag_study.service.languages import N_, _
+from sprag_study.service.reading.catalogue import range_sentence
+from sprag_study.service.reading.reader import Phrase, term
+from sprag_study.service.reading.texts import quantity_text
+from sprag_study.service.reading.units import QuantityError, typed_value
+from sprag_study.service.reading.wording import percent
+from sprag_study.service.results.selection import ends_of_range
+from sprag_study.service.results.start_states import refuse_impossible
+from sprag_study.service.views.branch import named
+from sprag_study.service.views.case_questions import BASIN, BasinQuestion
+from sprag_study.service.views.case_view import CaseAnswer, CaseView
+from sprag_study.service.views.setting import Offered
+from sprag_study.service.views.shown import Column, Shown, ShownTable
+from sprag_study.worker import models
+from sprag_study.worker.models import Basin
+from sprag_study.worker.models.common import case_machine
+from sprag_study.worker.models.starts import STARTS, has_starts
 
 if TYPE_CHECKING:
-    from sprag.service.figures.figure import Figure
-    from sprag.worker.models import Parameter
-    from sprag.worker.study import Study
+    from sprag_study.service.figures.figure import Figure
+    from sprag_study.worker.models import Parameter
+    from sprag_study.worker.study import Study
 
 #: Initial values that a basin can be drawn over.
 INITIAL: Final = ("initial_angle", "initial_speed", "initial_windup")

@@ -7,25 +7,25 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import Amount, Name, Whole
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.reader import Phrase, joined, plural
-from sprag.service.results.tolerances.nominal import deviations
-from sprag.service.results.tolerances.told import at_line, yield_sentence
-from sprag.service.results.tolerances.written import percent
-from sprag.service.results.tolerances.yields import WANTED
-from sprag.service.views.shown import Column, Shown, ShownTable
+from sprag_study.sentences import Amount, Name, Whole
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.reader import Phrase, joined, plural
+from sprag_study.service.results.tolerances.nominal import deviations
+from sprag_study.service.results.tolerances.told import at_line, yield_sentence
+from sprag_study.service.results.tolerances.written import percent
+from sprag_study.service.results.tolerances.yields import WANTED
+from sprag_study.service.views.shown import Column, Shown, ShownTable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from sprag.service.results.tolerances.causes import Causes
-    from sprag.service.results.tolerances.ribbons import Ribbon, RibbonLine, Spread
-    from sprag.service.results.tolerances.yields import WorstDrive, Yield, YieldLine
-    from sprag.service.views.shown import Cell
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.spread import Tolerance
-    from sprag.worker.study import Study
+    from sprag_study.service.results.tolerances.causes import Causes
+    from sprag_study.service.results.tolerances.ribbons import Ribbon, RibbonLine, Spread
+    from sprag_study.service.results.tolerances.yields import WorstDrive, Yield, YieldLine
+    from sprag_study.service.views.shown import Cell
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.spread import Tolerance
+    from sprag_study.worker.study import Study
 
 #: Drives in the short list of the worst ones.
 _WORST: Final = 5

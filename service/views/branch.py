@@ -7,40 +7,40 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import Amount, Sentence, Typed
-from sprag.service.answers import filled
-from sprag.service.answers.results import Branch, BranchContact
-from sprag.service.exports import table_csv
-from sprag.service.faults import choice_of, parameter_error
-from sprag.service.figures.branch import OwnCases, branch_figure, special_text
-from sprag.service.json_text import numbers
-from sprag.service.languages import N_, _
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.directions import case_values
-from sprag.service.reading.reader import Phrase, joined, plural
-from sprag.service.reading.units import QuantityError, typed_value
-from sprag.service.results.selection import axis_name, ends_of_range
-from sprag.service.views.case_questions import BRANCH, BranchQuestion
-from sprag.service.views.case_view import CaseAnswer, CaseView, Said
-from sprag.service.views.portrait import require_strobes
-from sprag.service.views.setting import Offered
-from sprag.service.views.shown import Shown
-from sprag.worker import models
-from sprag.worker.directions import SWEEP
-from sprag.worker.models.abilities import branch_results, run_branch
-from sprag.worker.models.branches import Along, CaseBranch
-from sprag.worker.models.common import NO_PARAMETERS, case_machine
-from sprag.worker.models.parameters import allowed_values
-from sprag.worker.models.vibration_drive.start_states import is_initial
+from sprag_study.sentences import Amount, Sentence, Typed
+from sprag_study.service.answers import filled
+from sprag_study.service.answers.results import Branch, BranchContact
+from sprag_study.service.exports import table_csv
+from sprag_study.service.faults import choice_of, parameter_error
+from sprag_study.service.figures.branch import OwnCases, branch_figure, special_text
+from sprag_study.service.json_text import numbers
+from sprag_study.service.languages import N_, _
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.directions import case_values
+from sprag_study.service.reading.reader import Phrase, joined, plural
+from sprag_study.service.reading.units import QuantityError, typed_value
+from sprag_study.service.results.selection import axis_name, ends_of_range
+from sprag_study.service.views.case_questions import BRANCH, BranchQuestion
+from sprag_study.service.views.case_view import CaseAnswer, CaseView, Said
+from sprag_study.service.views.portrait import require_strobes
+from sprag_study.service.views.setting import Offered
+from sprag_study.service.views.shown import Shown
+from sprag_study.worker import models
+from sprag_study.worker.directions import SWEEP
+from sprag_study.worker.models.abilities import branch_results, run_branch
+from sprag_study.worker.models.branches import Along, CaseBranch
+from sprag_study.worker.models.common import NO_PARAMETERS, case_machine
+from sprag_study.worker.models.parameters import allowed_values
+from sprag_study.worker.models.vibration_drive.start_states import is_initial
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from numpy.typing import NDArray
 
-    from sprag.service.figures.figure import Figure
-    from sprag.service.storage.store import Store
-    from sprag.worker.study import Study
+    from sprag_study.service.figures.figure import Figure
+    from sprag_study.service.storage.store import Store
+    from sprag_study.worker.study import Study
 
 #: What stands in the empty fields of a range.
 ENDS_OFFERED: Final = {"from": Offered(hint=N_("start of its axis")), "to": Offered(hint=N_("end of its axis"))}

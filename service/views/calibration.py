@@ -4,26 +4,26 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag.sentences import Amount, Name
-from sprag.service.answers.calibration import CalibrationReport
-from sprag.service.figures.calibration import calibration_figure
-from sprag.service.languages import N_
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.reader import Phrase, joined
-from sprag.service.results.calibration import Calibration, calibration_csv, calibration_json, plan_of
-from sprag.service.views.relatives import asked_by
-from sprag.service.views.shown import Column, Shown, ShownTable
-from sprag.service.views.study_questions import CALIBRATION, CalibrationQuestion
-from sprag.service.views.study_view import StudyAnswer, StudyView
+from sprag_study.sentences import Amount, Name
+from sprag_study.service.answers.calibration import CalibrationReport
+from sprag_study.service.figures.calibration import calibration_figure
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.reader import Phrase, joined
+from sprag_study.service.results.calibration import Calibration, calibration_csv, calibration_json, plan_of
+from sprag_study.service.views.relatives import asked_by
+from sprag_study.service.views.shown import Column, Shown, ShownTable
+from sprag_study.service.views.study_questions import CALIBRATION, CalibrationQuestion
+from sprag_study.service.views.study_view import StudyAnswer, StudyView
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from sprag.service.figures.figure import Figure
-    from sprag.service.reading.reader import Reading
-    from sprag.service.views.library import Library
-    from sprag.service.views.shown import Cell
-    from sprag.worker.study import Study
+    from sprag_study.service.figures.figure import Figure
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.service.views.library import Library
+    from sprag_study.service.views.shown import Cell
+    from sprag_study.worker.study import Study
 
 
 class CalibrationView(StudyView[CalibrationQuestion, None, Calibration]):

@@ -9,23 +9,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.service.exports import rows_json
-from sprag.service.faults import choice_of, parameter_error
-from sprag.service.reading.directions import case_units
-from sprag.service.results.explore import After, ExploreQuery
-from sprag.service.storage.studies.records import RowBlock
-from sprag.service.views.curves import pairs
-from sprag.service.views.explore import explored, selection
-from sprag.worker import models
-from sprag.worker.codes import FLAG_MASKS
+from sprag_study.service.exports import rows_json
+from sprag_study.service.faults import choice_of, parameter_error
+from sprag_study.service.reading.directions import case_units
+from sprag_study.service.results.explore import After, ExploreQuery
+from sprag_study.service.storage.studies.records import RowBlock
+from sprag_study.service.views.curves import pairs
+from sprag_study.service.views.explore import explored, selection
+from sprag_study.worker import models
+from sprag_study.worker.codes import FLAG_MASKS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from sprag.service.answers import results as m
-    from sprag.service.views.library import Library
-    from sprag.service.views.study_questions import CasesQuestion
-    from sprag.worker.study import Study
+    from sprag_study.service.answers import results as m
+    from sprag_study.service.views.library import Library
+    from sprag_study.service.views.study_questions import CasesQuestion
+    from sprag_study.worker.study import Study
 
 _ALLOWED = "`next_page_token` of a page of the same order"
 

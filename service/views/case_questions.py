@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Final
 
-from sprag.service.languages import N_
-from sprag.service.views.setting import Setting, ViewInfo
-from sprag.worker.limits import (
+from sprag_study.service.languages import N_
+from sprag_study.service.views.setting import Setting, ViewInfo
+from sprag_study.worker.limits import (
     MAX_BASIN_POINTS,
     MAX_DIAGRAM_STROBES,
     MAX_DIAGRAM_VALUES,

@@ -1,7 +1,8 @@
 """The views of a case: what each is asked, who has it, how it is computed, and how it is written and drawn.
 
 One description serves the address of the API, the section of a page, and the command: see
-`sprag.service.http.api.case_views`, `sprag.service.http.web.motion` and `sprag.service.cli.case_views`.
+`sprag_study.service.http.api.case_views`, `sprag_study.service.http.web.motion` and
+`sprag_study.service.cli.case_views`.
 """
 
 from __future__ import annotations
@@ -11,21 +12,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, TypeVar
 
-from sprag.service.figures.pictures import draw_figure
-from sprag.service.figures.read import read_figure
-from sprag.service.json_text import to_bytes
-from sprag.service.reading.reader import Reading
-from sprag.service.views.shown import Shown
-from sprag.worker import models
-from sprag.worker.models.starts import motion_of
+from sprag_study.service.figures.pictures import draw_figure
+from sprag_study.service.figures.read import read_figure
+from sprag_study.service.json_text import to_bytes
+from sprag_study.service.reading.reader import Reading
+from sprag_study.service.views.shown import Shown
+from sprag_study.worker import models
+from sprag_study.worker.models.starts import motion_of
 
 if TYPE_CHECKING:
-    from sprag.service.figures.figure import Figure
-    from sprag.service.figures.pictures import Picture
-    from sprag.service.storage.store import Store
-    from sprag.service.views.setting import Offered, ViewInfo
-    from sprag.worker.models import KernelShape
-    from sprag.worker.study import Study
+    from sprag_study.service.figures.figure import Figure
+    from sprag_study.service.figures.pictures import Picture
+    from sprag_study.service.storage.store import Store
+    from sprag_study.service.views.setting import Offered, ViewInfo
+    from sprag_study.worker.models import KernelShape
+    from sprag_study.worker.study import Study
 
 Question = TypeVar("Question")
 Chosen = TypeVar("Chosen")

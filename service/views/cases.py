@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from sprag.service.views.basin import BasinView
-from sprag.service.views.branch import BranchView
-from sprag.service.views.case_view import CaseView
-from sprag.service.views.engagements import EngagementsView
-from sprag.service.views.portrait import StrobesView
-from sprag.service.views.sections import DiagramView, SectionView
-from sprag.service.views.trajectory import TrajectoryView
-from sprag.service.views.transient import TransientView
+from sprag_study.service.views.basin import BasinView
+from sprag_study.service.views.branch import BranchView
+from sprag_study.service.views.case_view import CaseView
+from sprag_study.service.views.engagements import EngagementsView
+from sprag_study.service.views.portrait import StrobesView
+from sprag_study.service.views.sections import DiagramView, SectionView
+from sprag_study.service.views.trajectory import TrajectoryView
+from sprag_study.service.views.transient import TransientView
 
 #: By name, in the order of the API.
 CASE_VIEWS: Final[dict[str, CaseView[Any, Any, Any]]] = {

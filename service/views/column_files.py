@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Final
 import numpy as np
 import platformdirs
 
-from sprag.service.stale_files import marked, sweep
-from sprag.service.storage.database.private_files import PRIVATE_FOLDER_MODE
-from sprag.service.storage.rows.columns import RowColumns
+from sprag_study.service.stale_files import marked, sweep
+from sprag_study.service.storage.database.private_files import PRIVATE_FOLDER_MODE
+from sprag_study.service.storage.rows.columns import RowColumns
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

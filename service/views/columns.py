@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Final
 
 from cachetools import LRUCache
 
-from sprag.service.views.column_files import ColumnFiles, default_folder
+from sprag_study.service.views.column_files import ColumnFiles, default_folder
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.storage.rows.columns import RowColumns
-    from sprag.service.storage.store import Store
-    from sprag.service.storage.studies.records import StudyRecord
+    from sprag_study.service.storage.rows.columns import RowColumns
+    from sprag_study.service.storage.store import Store
+    from sprag_study.service.storage.studies.records import StudyRecord
 
 #: Bytes of columns kept in the memory of a process, of all studies together: those of a study that runs, or is small.
 _KEPT: Final = 32_000_000

@@ -6,35 +6,35 @@ from dataclasses import replace
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
-from sprag.service import exports
-from sprag.service.answers import results as m
-from sprag.service.faults import parameter_error
-from sprag.service.figures import pictures
-from sprag.service.figures.curves import curves_figure
-from sprag.service.figures.pictures import draw_map
-from sprag.service.figures.read import read_map
-from sprag.service.json_text import numbers
-from sprag.service.reading.directions import in_words
-from sprag.service.results.choice import held
-from sprag.service.results.curve_cases import check_map, select
-from sprag.service.results.curves import CurveQuery, Curves, Map, flag_names
-from sprag.service.results.defaults import completed, drawn_numbers
-from sprag.service.results.refined import not_joined
-from sprag.service.results.regimes import kind_columns
-from sprag.service.results.stored_curves import drawn_curves, stored_curves, stored_map
-from sprag.service.views import study_view
-from sprag.service.views.study_questions import CURVES, MAP, CurvesQuestion, MapQuestion
-from sprag.service.views.study_view import StudyAnswer, StudyView
-from sprag.worker import models
+from sprag_study.service import exports
+from sprag_study.service.answers import results as m
+from sprag_study.service.faults import parameter_error
+from sprag_study.service.figures import pictures
+from sprag_study.service.figures.curves import curves_figure
+from sprag_study.service.figures.pictures import draw_map
+from sprag_study.service.figures.read import read_map
+from sprag_study.service.json_text import numbers
+from sprag_study.service.reading.directions import in_words
+from sprag_study.service.results.choice import held
+from sprag_study.service.results.curve_cases import check_map, select
+from sprag_study.service.results.curves import CurveQuery, Curves, Map, flag_names
+from sprag_study.service.results.defaults import completed, drawn_numbers
+from sprag_study.service.results.refined import not_joined
+from sprag_study.service.results.regimes import kind_columns
+from sprag_study.service.results.stored_curves import drawn_curves, stored_curves, stored_map
+from sprag_study.service.views import study_view
+from sprag_study.service.views.study_questions import CURVES, MAP, CurvesQuestion, MapQuestion
+from sprag_study.service.views.study_view import StudyAnswer, StudyView
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from sprag.service.figures.figure import Figure
-    from sprag.service.reading.reader import Reading
-    from sprag.service.results.curves import Curve
-    from sprag.service.views.library import Library
-    from sprag.worker.study import Study
+    from sprag_study.service.figures.figure import Figure
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.service.results.curves import Curve
+    from sprag_study.service.views.library import Library
+    from sprag_study.worker.study import Study
 
 
 def pairs(texts: Sequence[str] | None, parameter: str = "at") -> tuple[tuple[str, str], ...]:

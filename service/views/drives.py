@@ -6,32 +6,32 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING
 
-from sprag.service.answers import tolerances as m
-from sprag.service.faults import parameter_error
-from sprag.service.figures.pictures import Picture, draw_map
-from sprag.service.figures.read import read_map
-from sprag.service.figures.ribbons import ribbon_figure, ribbon_map, yield_figure, yield_map
-from sprag.service.results.defaults import drawn_results, main_query, varying_axes
-from sprag.service.results.headlines.along import judged_by
-from sprag.service.results.selection import axis_name, numeric_names, numeric_results
-from sprag.service.results.tolerances.batch import Asked, places_of
-from sprag.service.results.tolerances.conditions import first_condition, read_conditions
-from sprag.service.results.tolerances.ribbons import QUANTILES, Ribbon, ribbon
-from sprag.service.results.tolerances.written import ribbon_csv, ribbon_json, yield_csv, yield_json
-from sprag.service.results.tolerances.yields import Yield, yields
-from sprag.service.views import study_view
-from sprag.service.views.branch import named
-from sprag.service.views.curves import pairs
-from sprag.service.views.setting import Offered
-from sprag.service.views.study_questions import RIBBON, YIELD, RibbonQuestion, YieldQuestion
-from sprag.service.views.study_view import StudyAnswer, StudyView
-from sprag.worker import models
+from sprag_study.service.answers import tolerances as m
+from sprag_study.service.faults import parameter_error
+from sprag_study.service.figures.pictures import Picture, draw_map
+from sprag_study.service.figures.read import read_map
+from sprag_study.service.figures.ribbons import ribbon_figure, ribbon_map, yield_figure, yield_map
+from sprag_study.service.results.defaults import drawn_results, main_query, varying_axes
+from sprag_study.service.results.headlines.along import judged_by
+from sprag_study.service.results.selection import axis_name, numeric_names, numeric_results
+from sprag_study.service.results.tolerances.batch import Asked, places_of
+from sprag_study.service.results.tolerances.conditions import first_condition, read_conditions
+from sprag_study.service.results.tolerances.ribbons import QUANTILES, Ribbon, ribbon
+from sprag_study.service.results.tolerances.written import ribbon_csv, ribbon_json, yield_csv, yield_json
+from sprag_study.service.results.tolerances.yields import Yield, yields
+from sprag_study.service.views import study_view
+from sprag_study.service.views.branch import named
+from sprag_study.service.views.curves import pairs
+from sprag_study.service.views.setting import Offered
+from sprag_study.service.views.study_questions import RIBBON, YIELD, RibbonQuestion, YieldQuestion
+from sprag_study.service.views.study_view import StudyAnswer, StudyView
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
-    from sprag.service.figures.figure import Figure
-    from sprag.service.reading.reader import Reading
-    from sprag.service.views.library import Library
-    from sprag.worker.study import Study
+    from sprag_study.service.figures.figure import Figure
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.service.views.library import Library
+    from sprag_study.worker.study import Study
 
 
 @dataclass(frozen=True, slots=True)

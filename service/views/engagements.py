@@ -5,25 +5,25 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Final
 
-from sprag.sentences import Amount
-from sprag.service.answers import filled
-from sprag.service.answers.results import EngagementRow, EngagementTables, PeriodRow
-from sprag.service.exports import table_csv
-from sprag.service.faults import FaultError, choice_of
-from sprag.service.languages import N_, _
-from sprag.service.reading.directions import case_values
-from sprag.service.reading.reader import Phrase, joined, plural
-from sprag.service.views.case_questions import ENGAGEMENTS, EngagementsQuestion
-from sprag.service.views.case_view import CaseAnswer, CaseView, Said
-from sprag.service.views.shown import Column, Shown, ShownTable
-from sprag.worker import models
-from sprag.worker.models import Engagements
+from sprag_study.sentences import Amount
+from sprag_study.service.answers import filled
+from sprag_study.service.answers.results import EngagementRow, EngagementTables, PeriodRow
+from sprag_study.service.exports import table_csv
+from sprag_study.service.faults import FaultError, choice_of
+from sprag_study.service.languages import N_, _
+from sprag_study.service.reading.directions import case_values
+from sprag_study.service.reading.reader import Phrase, joined, plural
+from sprag_study.service.views.case_questions import ENGAGEMENTS, EngagementsQuestion
+from sprag_study.service.views.case_view import CaseAnswer, CaseView, Said
+from sprag_study.service.views.shown import Column, Shown, ShownTable
+from sprag_study.worker import models
+from sprag_study.worker.models import Engagements
 
 if TYPE_CHECKING:
-    from sprag.service.answers import Value
-    from sprag.service.views.shown import Cell
-    from sprag.worker.models import Engagement
-    from sprag.worker.study import Study
+    from sprag_study.service.answers import Value
+    from sprag_study.service.views.shown import Cell
+    from sprag_study.worker.models import Engagement
+    from sprag_study.worker.study import Study
 
 #: Most engagements that people are shown, and their columns.
 _SHOWN: Final = 100

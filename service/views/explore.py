@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.answers import explore as m
-from sprag.service.faults import refused
-from sprag.service.figures.explore import explore_figure
-from sprag.service.results.explore import Explored, ExploreQuery, explore, explored_csv, explored_json, plan_of
-from sprag.service.spec.design import points_spec
-from sprag.service.spec.stored import accepted
-from sprag.service.views import study_view
-from sprag.service.views.study_questions import EXPLORE, CasesQuestion, ExploreQuestion, SelectionQuestion
-from sprag.service.views.study_view import StudyAnswer, StudyView
+from sprag_study.service.answers import explore as m
+from sprag_study.service.faults import refused
+from sprag_study.service.figures.explore import explore_figure
+from sprag_study.service.results.explore import Explored, ExploreQuery, explore, explored_csv, explored_json, plan_of
+from sprag_study.service.spec.design import points_spec
+from sprag_study.service.spec.stored import accepted
+from sprag_study.service.views import study_view
+from sprag_study.service.views.study_questions import EXPLORE, CasesQuestion, ExploreQuestion, SelectionQuestion
+from sprag_study.service.views.study_view import StudyAnswer, StudyView
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from sprag.service.figures.figure import Figure
-    from sprag.service.reading.reader import Reading
-    from sprag.service.views.library import Library
-    from sprag.worker.study import Study
+    from sprag_study.service.figures.figure import Figure
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.service.views.library import Library
+    from sprag_study.worker.study import Study
 
 #: The query, and the two quantities of a picture.
 Chosen = tuple[ExploreQuery, tuple[str, str]]

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag.service.answers import goals as m
-from sprag.service.figures.front import front_figure
-from sprag.service.figures.pictures import MAX_PICTURE_POINTS, Picture, check_size
-from sprag.service.results.fronts import Designs, front_csv, front_json, goal_of
-from sprag.service.views import study_view
-from sprag.service.views.study_questions import FRONT, FrontQuestion
-from sprag.service.views.study_view import StudyAnswer, StudyView
+from sprag_study.service.answers import goals as m
+from sprag_study.service.figures.front import front_figure
+from sprag_study.service.figures.pictures import MAX_PICTURE_POINTS, Picture, check_size
+from sprag_study.service.results.fronts import Designs, front_csv, front_json, goal_of
+from sprag_study.service.views import study_view
+from sprag_study.service.views.study_questions import FRONT, FrontQuestion
+from sprag_study.service.views.study_view import StudyAnswer, StudyView
 
 if TYPE_CHECKING:
-    from sprag.service.figures.figure import Figure
-    from sprag.service.reading.reader import Reading
-    from sprag.service.views.library import Library
-    from sprag.worker.study import Study
+    from sprag_study.service.figures.figure import Figure
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.service.views.library import Library
+    from sprag_study.worker.study import Study
 
 
 class FrontView(StudyView[FrontQuestion, FrontQuestion, Designs]):

@@ -11,33 +11,33 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.sentences import Amount, Name
-from sprag.service.faults import SelectionError
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.reader import Phrase, joined, plural, term
-from sprag.service.results.choice import characteristic
-from sprag.service.results.curve_cases import select
-from sprag.service.results.headlines.along import along_headline
-from sprag.service.results.headlines.batch import asked_like, batch_headline
-from sprag.service.results.headlines.calibrated import calibrated_headline
-from sprag.service.results.headlines.headline import Headline, KeyNumber, Trace, amount, digits
-from sprag.service.results.headlines.search import search_headline
-from sprag.service.results.key_answers import answers_query, find_answers
-from sprag.service.results.refined_maps import map_plan
-from sprag.service.results.sweeps import hysteresis
-from sprag.service.storage.database.session import in_one_moment
-from sprag.service.views.answers import whole_columns
-from sprag.service.views.relatives import asked_by
-from sprag.service.views.study_view import FEW
-from sprag.worker import models
-from sprag.worker.states import StudyState
+from sprag_study.sentences import Amount, Name
+from sprag_study.service.faults import SelectionError
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.reader import Phrase, joined, plural, term
+from sprag_study.service.results.choice import characteristic
+from sprag_study.service.results.curve_cases import select
+from sprag_study.service.results.headlines.along import along_headline
+from sprag_study.service.results.headlines.batch import asked_like, batch_headline
+from sprag_study.service.results.headlines.calibrated import calibrated_headline
+from sprag_study.service.results.headlines.headline import Headline, KeyNumber, Trace, amount, digits
+from sprag_study.service.results.headlines.search import search_headline
+from sprag_study.service.results.key_answers import answers_query, find_answers
+from sprag_study.service.results.refined_maps import map_plan
+from sprag_study.service.results.sweeps import hysteresis
+from sprag_study.service.storage.database.session import in_one_moment
+from sprag_study.service.views.answers import whole_columns
+from sprag_study.service.views.relatives import asked_by
+from sprag_study.service.views.study_view import FEW
+from sprag_study.worker import models
+from sprag_study.worker.states import StudyState
 
 if TYPE_CHECKING:
-    from sprag.service.results.curves import CurveQuery
-    from sprag.service.storage.studies.records import CaseColumns, Progress, StudyRecord
-    from sprag.service.views.library import Library
-    from sprag.worker.planning.refine_plan import RefinePlan
-    from sprag.worker.study import Study
+    from sprag_study.service.results.curves import CurveQuery
+    from sprag_study.service.storage.studies.records import CaseColumns, Progress, StudyRecord
+    from sprag_study.service.views.library import Library
+    from sprag_study.worker.planning.refine_plan import RefinePlan
+    from sprag_study.worker.study import Study
 
 __all__ = ["Headline", "KeyNumber", "Trace", "headline_of", "is_small", "usual_query"]
 

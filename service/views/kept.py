@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Final, Generic, TypeVar
 
 from cachetools import LRUCache
 
-from sprag.service.results.calibration import calibration_of
-from sprag.service.results.fronts import designs_of
+from sprag_study.service.results.calibration import calibration_of
+from sprag_study.service.results.fronts import designs_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from sprag.service.results.calibration import Calibration
-    from sprag.service.results.fronts import Designs
-    from sprag.service.storage.store import Store
+    from sprag_study.service.results.calibration import Calibration
+    from sprag_study.service.results.fronts import Designs
+    from sprag_study.service.storage.store import Store
 
 Key = TypeVar("Key")
 Found = TypeVar("Found")

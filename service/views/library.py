@@ -7,20 +7,20 @@ from typing import TYPE_CHECKING, Final
 
 from cachetools import LRUCache
 
-from sprag.service.reading.quantities import TYPED, read_units
-from sprag.service.reading.reader import Choice, Reading, reading_for
-from sprag.service.results.unaffected import Unaffected
-from sprag.service.storage.store import Store
-from sprag.service.views.columns import Columns
-from sprag.service.views.kept import Calibrations, Fronts, Kept
-from sprag.worker.pool.child_process import uncounted
+from sprag_study.service.reading.quantities import TYPED, read_units
+from sprag_study.service.reading.reader import Choice, Reading, reading_for
+from sprag_study.service.results.unaffected import Unaffected
+from sprag_study.service.storage.store import Store
+from sprag_study.service.views.columns import Columns
+from sprag_study.service.views.kept import Calibrations, Fronts, Kept
+from sprag_study.worker.pool.child_process import uncounted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from sprag.service.reading.reader import Phrase
-    from sprag.service.results.headlines.headline import Headline
-    from sprag.worker.chunking import Chunking
+    from sprag_study.service.reading.reader import Phrase
+    from sprag_study.service.results.headlines.headline import Headline
+    from sprag_study.worker.chunking import Chunking
 
 #: Headlines that are kept: of questions, and of listed studies.
 _TOLD: Final = 512

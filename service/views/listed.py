@@ -11,25 +11,25 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from sprag.sentences import Name
-from sprag.service.faults import FaultError
-from sprag.service.languages import N_
-from sprag.service.reading.reader import Phrase, Reading
-from sprag.service.results.choice import characteristic
-from sprag.service.storage.errors import StoreError
-from sprag.service.views.headline import headline_of, is_small
-from sprag.service.views.library import reading_of
-from sprag.service.views.relatives import asked_by
-from sprag.worker import models
+from sprag_study.sentences import Name
+from sprag_study.service.faults import FaultError
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.reader import Phrase, Reading
+from sprag_study.service.results.choice import characteristic
+from sprag_study.service.storage.errors import StoreError
+from sprag_study.service.views.headline import headline_of, is_small
+from sprag_study.service.views.library import reading_of
+from sprag_study.service.views.relatives import asked_by
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from sprag.service.reading.reader import Choice
-    from sprag.service.results.headlines.headline import Headline
-    from sprag.service.storage.studies.records import StudyRecord
-    from sprag.service.views.library import Library
-    from sprag.worker.study import Study
+    from sprag_study.service.reading.reader import Choice
+    from sprag_study.service.results.headlines.headline import Headline
+    from sprag_study.service.storage.studies.records import StudyRecord
+    from sprag_study.service.views.library import Library
+    from sprag_study.worker.study import Study
 
 #: Answers of a row.
 ANSWERS: Final = 3

@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.answers.results import Portrait as PortraitData
-from sprag.service.faults import FaultError, choice_of
-from sprag.service.figures.portrait import portrait_figure
-from sprag.service.languages import N_
-from sprag.service.reading.directions import case_values
-from sprag.service.results.regimes import motion_sentence
-from sprag.service.views.case_questions import STROBES, StrobesQuestion
-from sprag.service.views.case_view import CaseAnswer, CaseView
-from sprag.service.views.setting import choices_of
-from sprag.service.views.shown import Shown
-from sprag.service.views.trajectory import timed_values, trajectory_csv
-from sprag.worker import models
-from sprag.worker.models import Portrait
+from sprag_study.service.answers.results import Portrait as PortraitData
+from sprag_study.service.faults import FaultError, choice_of
+from sprag_study.service.figures.portrait import portrait_figure
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.directions import case_values
+from sprag_study.service.results.regimes import motion_sentence
+from sprag_study.service.views.case_questions import STROBES, StrobesQuestion
+from sprag_study.service.views.case_view import CaseAnswer, CaseView
+from sprag_study.service.views.setting import choices_of
+from sprag_study.service.views.shown import Shown
+from sprag_study.service.views.trajectory import timed_values, trajectory_csv
+from sprag_study.worker import models
+from sprag_study.worker.models import Portrait
 
 if TYPE_CHECKING:
-    from sprag.service.answers import Value
-    from sprag.service.figures.figure import Figure
-    from sprag.worker.study import Study
+    from sprag_study.service.answers import Value
+    from sprag_study.service.figures.figure import Figure
+    from sprag_study.worker.study import Study
 
 
 def require_strobes(study: Study) -> None:

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from sprag.service.faults import Fault, FaultError, ParameterFault, shown
-from sprag.service.views.setting import settings_of
+from sprag_study.service.faults import Fault, FaultError, ParameterFault, shown
+from sprag_study.service.views.setting import settings_of
 
 if TYPE_CHECKING:
-    from sprag.service.faults import Code
-    from sprag.service.views.setting import NamedSetting
+    from sprag_study.service.faults import Code
+    from sprag_study.service.views.setting import NamedSetting
 
 Question = TypeVar("Question")
 

@@ -8,22 +8,22 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal
 
-from sprag.sentences import Amount, Name
-from sprag.service.answers.studies import StudyOrder
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.reader import Phrase, joined
-from sprag.service.storage.studies.listing import StudyFilter
-from sprag.worker import models
-from sprag.worker.planning.calibrate.plan import CALIBRATE
-from sprag.worker.planning.goals.plan import GOAL
-from sprag.worker.study import SAME_VALUE
+from sprag_study.sentences import Amount, Name
+from sprag_study.service.answers.studies import StudyOrder
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.reader import Phrase, joined
+from sprag_study.service.storage.studies.listing import StudyFilter
+from sprag_study.worker import models
+from sprag_study.worker.planning.calibrate.plan import CALIBRATE
+from sprag_study.worker.planning.goals.plan import GOAL
+from sprag_study.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from sprag.service.storage.studies.records import StudyRecord
-    from sprag.service.views.library import Library
-    from sprag.worker.study import Study
+    from sprag_study.service.storage.studies.records import StudyRecord
+    from sprag_study.service.views.library import Library
+    from sprag_study.worker.study import Study
 
 #: What a study asks of its machine: how it runs, which design is best, what tolerances do, what a measurement says.
 Asked = Literal["along", "best", "tolerances", "measured"]

@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sprag.service.exports import export, room_required, stored
+from sprag_study.service.exports import export, room_required, stored
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from sprag.service.formats import Format, Header
-    from sprag.service.views.library import Library
+    from sprag_study.service.formats import Format, Header
+    from sprag_study.service.views.library import Library
 
 
 def prepare() -> None:

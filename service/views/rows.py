@@ -5,19 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.reading.catalogue import result_of
-from sprag.service.results.defaults import drawn_results, usual_value, varying_axes
-from sprag.service.results.explore import MOST_SHOWN, Explored, ExploreQuery, explore, plan_of, usual_quantities
-from sprag.service.results.fronts import conditions_of, further_of, goal_of, infos_of
-from sprag.service.results.headlines.along import judged_by
-from sprag.service.results.selection import own_paths
-from sprag.service.views.relatives import asked_by
-from sprag.worker import models
+from sprag_study.service.reading.catalogue import result_of
+from sprag_study.service.results.defaults import drawn_results, usual_value, varying_axes
+from sprag_study.service.results.explore import MOST_SHOWN, Explored, ExploreQuery, explore, plan_of, usual_quantities
+from sprag_study.service.results.fronts import conditions_of, further_of, goal_of, infos_of
+from sprag_study.service.results.headlines.along import judged_by
+from sprag_study.service.results.selection import own_paths
+from sprag_study.service.views.relatives import asked_by
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
-    from sprag.service.views.library import Library
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.study import Study
+    from sprag_study.service.views.library import Library
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.study import Study
 
 #: What every design of a search has beside its goals and limits.
 PLACES: Final = ("rank", "violation", "miss")

@@ -7,30 +7,30 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.service.answers.sections import Sections
-from sprag.service.exports import table_csv
-from sprag.service.faults import choice_of, parameter_error
-from sprag.service.figures.sections import diagram_figure, section_figure
-from sprag.service.json_text import numbers
-from sprag.service.languages import N_
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.directions import case_values
-from sprag.service.reading.numbers import in_language
-from sprag.service.reading.units import QuantityError, typed_value
-from sprag.service.results.start_states import refuse_impossible
-from sprag.service.views.branch import ENDS_OFFERED, along_offered, named, range_of
-from sprag.service.views.case_questions import DIAGRAM, SECTION, DiagramQuestion, SectionQuestion
-from sprag.service.views.case_view import CaseAnswer, CaseView
-from sprag.service.views.portrait import require_strobes
-from sprag.service.views.setting import Offered
-from sprag.worker import models
-from sprag.worker.models.abilities import run_sections
-from sprag.worker.models.common import case_machine
-from sprag.worker.models.sections import CaseSections, Sampling
+from sprag_study.service.answers.sections import Sections
+from sprag_study.service.exports import table_csv
+from sprag_study.service.faults import choice_of, parameter_error
+from sprag_study.service.figures.sections import diagram_figure, section_figure
+from sprag_study.service.json_text import numbers
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.directions import case_values
+from sprag_study.service.reading.numbers import in_language
+from sprag_study.service.reading.units import QuantityError, typed_value
+from sprag_study.service.results.start_states import refuse_impossible
+from sprag_study.service.views.branch import ENDS_OFFERED, along_offered, named, range_of
+from sprag_study.service.views.case_questions import DIAGRAM, SECTION, DiagramQuestion, SectionQuestion
+from sprag_study.service.views.case_view import CaseAnswer, CaseView
+from sprag_study.service.views.portrait import require_strobes
+from sprag_study.service.views.setting import Offered
+from sprag_study.worker import models
+from sprag_study.worker.models.abilities import run_sections
+from sprag_study.worker.models.common import case_machine
+from sprag_study.worker.models.sections import CaseSections, Sampling
 
 if TYPE_CHECKING:
-    from sprag.service.figures.figure import Figure
-    from sprag.worker.study import Study
+    from sprag_study.service.figures.figure import Figure
+    from sprag_study.worker.study import Study
 
 
 #: What stands in the empty field of a phase.

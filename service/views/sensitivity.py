@@ -6,35 +6,35 @@ from dataclasses import fields
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
-from sprag.sentences import Amount, Name
-from sprag.service import exports
-from sprag.service.answers import results as m
-from sprag.service.faults import warned
-from sprag.service.figures.effects import effects_figure
-from sprag.service.figures.pictures import MOST_RESULTS, draw_sensitivity
-from sprag.service.languages import N_
-from sprag.service.reading.reader import Phrase, joined, plural
-from sprag.service.results.defaults import drawn_results, varying_axes
-from sprag.service.results.selection import numeric_names, numeric_results
-from sprag.service.results.sensitivity import Sensitivity, in_order, sensitivity
-from sprag.service.results.sensitivity_indices import Indices
-from sprag.service.views.branch import named
-from sprag.service.views.setting import Offered
-from sprag.service.views.shown import Column, Shown, ShownTable
-from sprag.service.views.study_questions import SENSITIVITY, SensitivityQuestion
-from sprag.service.views.study_view import StudyAnswer, StudyView
-from sprag.worker import models
+from sprag_study.sentences import Amount, Name
+from sprag_study.service import exports
+from sprag_study.service.answers import results as m
+from sprag_study.service.faults import warned
+from sprag_study.service.figures.effects import effects_figure
+from sprag_study.service.figures.pictures import MOST_RESULTS, draw_sensitivity
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.reader import Phrase, joined, plural
+from sprag_study.service.results.defaults import drawn_results, varying_axes
+from sprag_study.service.results.selection import numeric_names, numeric_results
+from sprag_study.service.results.sensitivity import Sensitivity, in_order, sensitivity
+from sprag_study.service.results.sensitivity_indices import Indices
+from sprag_study.service.views.branch import named
+from sprag_study.service.views.setting import Offered
+from sprag_study.service.views.shown import Column, Shown, ShownTable
+from sprag_study.service.views.study_questions import SENSITIVITY, SensitivityQuestion
+from sprag_study.service.views.study_view import StudyAnswer, StudyView
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
     from typing import Any
 
-    from sprag.service.figures.figure import Figure
-    from sprag.service.figures.pictures import Picture
-    from sprag.service.reading.reader import Reading
-    from sprag.service.results.sensitivity import Effect
-    from sprag.service.views.library import Library
-    from sprag.worker.study import Study
+    from sprag_study.service.figures.figure import Figure
+    from sprag_study.service.figures.pictures import Picture
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.service.results.sensitivity import Effect
+    from sprag_study.service.views.library import Library
+    from sprag_study.worker.study import Study
 
 
 class SensitivityView(StudyView[SensitivityQuestion, tuple[str, ...], list[Sensitivity]]):

@@ -12,10 +12,10 @@ from dataclasses import MISSING, dataclass, field, fields
 from keyword import iskeyword
 from typing import Any, Final, Literal, TypeVar, get_args, get_origin, get_type_hints
 
-from sprag.service.faults import parameter_error
-from sprag.service.languages import N_
-from sprag.service.reading.limits import span
-from sprag.service.reading.numbers import probability_of, whole_number
+from sprag_study.service.faults import parameter_error
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.limits import span
+from sprag_study.service.reading.numbers import probability_of, whole_number
 
 Question = TypeVar("Question")
 

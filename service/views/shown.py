@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.reading.wording import unit_text
+from sprag_study.service.reading.wording import unit_text
 
 if TYPE_CHECKING:
-    from sprag.service.reading.reader import Reading
+    from sprag_study.service.reading.reader import Reading
 
 #: A number in SI (None for none), or a text, of which a phrase is said in the reader's language.
 Cell = float | int | str | None

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from sprag.service.views.answers import AnswersView
-from sprag.service.views.calibration import CalibrationView
-from sprag.service.views.curves import CurvesView, MapView
-from sprag.service.views.drives import RibbonView, YieldView
-from sprag.service.views.explore import ExploreView
-from sprag.service.views.front import FrontView
-from sprag.service.views.sensitivity import SensitivityView
-from sprag.service.views.study_view import StudyView
+from sprag_study.service.views.answers import AnswersView
+from sprag_study.service.views.calibration import CalibrationView
+from sprag_study.service.views.curves import CurvesView, MapView
+from sprag_study.service.views.drives import RibbonView, YieldView
+from sprag_study.service.views.explore import ExploreView
+from sprag_study.service.views.front import FrontView
+from sprag_study.service.views.sensitivity import SensitivityView
+from sprag_study.service.views.study_view import StudyView
 
 #: By name, in the order of the API.
 STUDY_VIEWS: Final[dict[str, StudyView[Any, Any, Any]]] = {

@@ -7,10 +7,10 @@ from typing import Annotated, Final, Literal
 
 from annotated_types import Interval
 
-from sprag.service.languages import N_
-from sprag.service.views.setting import Setting, ViewInfo
-from sprag.worker.codes import ENDING_CODES, FLAG_MASKS, PENDING, REGIME_CODES
-from sprag.worker.limits import (
+from sprag_study.service.languages import N_
+from sprag_study.service.views.setting import Setting, ViewInfo
+from sprag_study.worker.codes import ENDING_CODES, FLAG_MASKS, PENDING, REGIME_CODES
+from sprag_study.worker.limits import (
     MAX_DESIGNS,
     MAX_PAGE_SIZE,
     MAX_PAGE_TOKEN,

@@ -1,6 +1,7 @@
 """The views of a study: what each is asked, how it is found in the rows of the study, and how it is written and drawn.
 
-One description serves the addresses of the API (`sprag.service.http.api.study_views`), the pages and the command line.
+One description serves the addresses of the API (`sprag_study.service.http.api.study_views`), the pages and the command
+line.
 """
 
 from __future__ import annotations
@@ -10,19 +11,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, TypeVar
 
-from sprag.service.figures.pictures import draw_figure
-from sprag.service.figures.read import read_figure
-from sprag.service.json_text import to_bytes
-from sprag.service.views.library import reading_of
-from sprag.service.views.shown import NOTHING, Shown
+from sprag_study.service.figures.pictures import draw_figure
+from sprag_study.service.figures.read import read_figure
+from sprag_study.service.json_text import to_bytes
+from sprag_study.service.views.library import reading_of
+from sprag_study.service.views.shown import NOTHING, Shown
 
 if TYPE_CHECKING:
-    from sprag.service.figures.figure import Figure
-    from sprag.service.figures.pictures import Picture
-    from sprag.service.reading.reader import Choice, Reading
-    from sprag.service.views.library import Library
-    from sprag.service.views.setting import Offered, ViewInfo
-    from sprag.worker.study import Study
+    from sprag_study.service.figures.figure import Figure
+    from sprag_study.service.figures.pictures import Picture
+    from sprag_study.service.reading.reader import Choice, Reading
+    from sprag_study.service.views.library import Library
+    from sprag_study.service.views.setting import Offered, ViewInfo
+    from sprag_study.worker.study import Study
 
 #: Numbers of a view that the service itself reads and writes, in about ten milliseconds; more belong in another
 #: process, because they take seconds during which nobody else would be answered.

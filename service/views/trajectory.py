@@ -6,37 +6,37 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
-from sprag.sentences import Amount, Part, Sentence, Typed
-from sprag.service.answers.results import AngleTable
-from sprag.service.answers.results import Trajectory as TrajectoryData
-from sprag.service.exports import read_table
-from sprag.service.faults import parameter_error
-from sprag.service.figures.figure import Figure, Quantity
-from sprag.service.figures.motion import motion_figure, phase_figure
-from sprag.service.json_text import numbers
-from sprag.service.languages import N_
-from sprag.service.reading.directions import case_values
-from sprag.service.reading.quantities import Units
-from sprag.service.reading.reader import Phrase, joined, plural, term
-from sprag.service.reading.units import (
+from sprag_study.sentences import Amount, Part, Sentence, Typed
+from sprag_study.service.answers.results import AngleTable
+from sprag_study.service.answers.results import Trajectory as TrajectoryData
+from sprag_study.service.exports import read_table
+from sprag_study.service.faults import parameter_error
+from sprag_study.service.figures.figure import Figure, Quantity
+from sprag_study.service.figures.motion import motion_figure, phase_figure
+from sprag_study.service.json_text import numbers
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.directions import case_values
+from sprag_study.service.reading.quantities import Units
+from sprag_study.service.reading.reader import Phrase, joined, plural, term
+from sprag_study.service.reading.units import (
     PERIOD_NAMES,
     QuantityError,
     split_quantity,
     to_float,
     typed_value,
 )
-from sprag.service.results.selection import ends_of_range
-from sprag.service.views.case_questions import TRAJECTORY, TrajectoryQuestion
-from sprag.service.views.case_view import CaseAnswer, CaseView, Said
-from sprag.service.views.shown import Shown
-from sprag.worker import models
-from sprag.worker.models import Trajectory
+from sprag_study.service.results.selection import ends_of_range
+from sprag_study.service.views.case_questions import TRAJECTORY, TrajectoryQuestion
+from sprag_study.service.views.case_view import CaseAnswer, CaseView, Said
+from sprag_study.service.views.shown import Shown
+from sprag_study.worker import models
+from sprag_study.worker.models import Trajectory
 
 if TYPE_CHECKING:
-    from sprag.service.answers import Value
-    from sprag.service.answers.results import TimedValues, ValueAxis
-    from sprag.worker.models import Extent
-    from sprag.worker.study import Study
+    from sprag_study.service.answers import Value
+    from sprag_study.service.answers.results import TimedValues, ValueAxis
+    from sprag_study.worker.models import Extent
+    from sprag_study.worker.study import Study
 
 
 def span(study: Study, case: int, start: str | None, end: str | None) -> tuple[float, float]:

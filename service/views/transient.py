@@ -5,33 +5,33 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from sprag.sentences import Amount, Sentence, Typed, Whole
-from sprag.service.answers.transients import Transient as TransientData
-from sprag.service.faults import FaultError, choice_of, parameter_error
-from sprag.service.figures.transient import transient_figure
-from sprag.service.languages import N_, _
-from sprag.service.reading.limits import span
-from sprag.service.reading.numbers import in_language
-from sprag.service.reading.reader import Phrase, joined, term
-from sprag.service.reading.units import QuantityError, typed_value
-from sprag.service.results.transient_causes import cause_phrase
-from sprag.service.views.case_questions import TRANSIENT, TransientQuestion
-from sprag.service.views.case_view import CaseAnswer, CaseView, Said
-from sprag.service.views.setting import Offered
-from sprag.service.views.shown import Column, Shown, ShownTable
-from sprag.service.views.trajectory import timed_values, trajectory_csv
-from sprag.worker import models
-from sprag.worker.limits import MIN_TRAJECTORY_POINTS
-from sprag.worker.models.abilities import has_motor, has_transients, run_transient, shape_of_transients
-from sprag.worker.models.transients import KINDS, RESULTS, Course, Transient
+from sprag_study.sentences import Amount, Sentence, Typed, Whole
+from sprag_study.service.answers.transients import Transient as TransientData
+from sprag_study.service.faults import FaultError, choice_of, parameter_error
+from sprag_study.service.figures.transient import transient_figure
+from sprag_study.service.languages import N_, _
+from sprag_study.service.reading.limits import span
+from sprag_study.service.reading.numbers import in_language
+from sprag_study.service.reading.reader import Phrase, joined, term
+from sprag_study.service.reading.units import QuantityError, typed_value
+from sprag_study.service.results.transient_causes import cause_phrase
+from sprag_study.service.views.case_questions import TRANSIENT, TransientQuestion
+from sprag_study.service.views.case_view import CaseAnswer, CaseView, Said
+from sprag_study.service.views.setting import Offered
+from sprag_study.service.views.shown import Column, Shown, ShownTable
+from sprag_study.service.views.trajectory import timed_values, trajectory_csv
+from sprag_study.worker import models
+from sprag_study.worker.limits import MIN_TRAJECTORY_POINTS
+from sprag_study.worker.models.abilities import has_motor, has_transients, run_transient, shape_of_transients
+from sprag_study.worker.models.transients import KINDS, RESULTS, Course, Transient
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-    from sprag.service.figures.figure import Figure
-    from sprag.worker.models import KernelShape
-    from sprag.worker.models.transients import Kind
-    from sprag.worker.study import Study
+    from sprag_study.service.figures.figure import Figure
+    from sprag_study.worker.models import KernelShape
+    from sprag_study.worker.models.transients import Kind
+    from sprag_study.worker.study import Study
 
 #: The parameters of a transient besides its kind: unit, smallest and largest value.
 _RANGES: Final = {

@@ -35,7 +35,7 @@ INTERRUPTIBLE = (
     sys.executable,
     "-c",
     "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
-    "from sprag.service.cli import main; main()",
+    "from sprag_study.service.cli import main; main()",
 )
 
 

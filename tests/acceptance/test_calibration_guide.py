@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from sprag.service.jobs.local import run_here
-from sprag.service.results.calibration import calibration_json, calibration_of
-from sprag.service.spec.document import parse_spec
+from sprag_study.service.jobs.local import run_here
+from sprag_study.service.results.calibration import calibration_json, calibration_of
+from sprag_study.service.spec.document import parse_spec
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "guide-calibration.md"

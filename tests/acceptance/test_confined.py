@@ -15,7 +15,7 @@ import httpx
 import pytest
 
 from benchmarks.faults.harness import COMMAND, kill_family, until
-from sprag.service.storage.store import Store
+from sprag_study.service.storage.store import Store
 from tests.acceptance.containers import KERNELS
 from tests.acceptance.unit import settings
 from tests.conftest import ROOT
@@ -143,7 +143,7 @@ def test_what_the_filters_forbid_ends_no_process_of_the_pool(root: Path, tmp_pat
     unit.write_text(text)
     code = (
         "import errno, os\n"
-        "from sprag.worker.pool.processes import give_way\n"
+        "from sprag_study.worker.pool.processes import give_way\n"
         "try: os.nice(0)\n"
         "except OSError as error: print(errno.errorcode[error.errno])\n"
         "give_way()\n"
@@ -166,5 +166,5 @@ def test_home_and_cache_are_where_the_unit_may_write(root: Path) -> None:
     found = environment(root)
     assert Path(found["HOME"]).is_dir()
     assert Path(found["XDG_CACHE_HOME"]).is_dir()
-    code = "from sprag.service.views.column_files import default_folder; print(default_folder())"
+    code = "from sprag_study.service.views.column_files import default_folder; print(default_folder())"
     assert Path(confined(sys.executable, "-c", code, cwd=root).strip()).is_relative_to(root)

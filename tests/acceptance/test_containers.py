@@ -61,7 +61,7 @@ def answers(address: str) -> None:
 
 def test_the_image_has_the_program_and_nothing_of_its_sources(image: Image) -> None:
     assert not image.path("/build").exists()
-    where = image.run(["/opt/sprag/bin/python", "-c", "import sprag; print(sprag.__file__)"])
+    where = image.run(["/opt/sprag/bin/python", "-c", "import sprag_study; print(sprag_study.__file__)"])
     assert where.startswith(f"{image.root}/opt/sprag/lib/")
     extras = next(rest for name, rest in steps(RECIPE) if name == "RUN" and "pip" in rest)
     assert "--constraint constraints.txt '.[postgres,cluster]'" in extras
@@ -73,13 +73,13 @@ def test_the_image_has_the_program_and_nothing_of_its_sources(image: Image) -> N
 
 
 def test_a_build_gets_what_it_needs_and_nothing_private(image: Image) -> None:
-    for path in ("sprag/service", "service/http/web/static/common.css", "docs/guide.md", "docs/man/sprag.1"):
+    for path in ("sprag_study/service", "service/http/web/static/common.css", "docs/guide.md", "docs/man/sprag.1"):
         assert is_sent(path), path
     private = (".git/config", ".venv/bin/python", "sprag.sqlite3", "service/studies.sqlite3-wal", "examples/.env",
                "worker/sprag.env", "engine/__pycache__/ids.pyc", "tests/conftest.py", "build/lib/x.py")  # fmt: skip
     assert [path for path in private if is_sent(path)] == []
     assert any(image.path("/opt/sprag/share/man/man1").glob("sprag.1"))
-    package = next(image.path("/opt/sprag/lib").glob("python*/site-packages/sprag"))
+    package = next(image.path("/opt/sprag/lib").glob("python*/site-packages/sprag_study"))
     assert (package / "service" / "languages" / "uk.po").exists()
 
 

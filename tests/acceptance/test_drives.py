@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-import sprag
-from sprag.worker.spread import DRIVE
-from tests.sprag.test_library import SPEC
+import sprag_study as sprag
+from sprag_study.worker.spread import DRIVE
+from tests.sprag_study.test_library import SPEC
 
 DRIVES = 64
 BACKLASH, MASS, LOAD = "pendulums.0.backlash", "pendulums.0.mass", "shaft.load"

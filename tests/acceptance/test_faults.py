@@ -14,7 +14,7 @@ from benchmarks.faults.badcases import badcases
 from benchmarks.faults.clients import clients
 from benchmarks.faults.disk import file_limit
 from benchmarks.faults.powercut import powercut
-from sprag.service.storage.database.sqlite_files import sqlite_driver
+from sprag_study.service.storage.database.sqlite_files import sqlite_driver
 from tests.conftest import Finished
 
 

@@ -11,12 +11,12 @@ from typing import Any
 
 import pytest
 
-from sprag.service.jobs.local import run_here
-from sprag.service.presets import preset_text
-from sprag.service.results.fronts import designs_of, front_json
-from sprag.service.results.rounds import sentence
-from sprag.service.spec.document import parse_spec
-from sprag.worker.states import StudyState
+from sprag_study.service.jobs.local import run_here
+from sprag_study.service.presets import preset_text
+from sprag_study.service.results.fronts import designs_of, front_json
+from sprag_study.service.results.rounds import sentence
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.worker.states import StudyState
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "guide-goals.md"
 SMALL = {"population": 8, "generations": 2}

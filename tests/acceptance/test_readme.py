@@ -37,7 +37,7 @@ def tools(folder: Path) -> str:
     """A PATH on which `.venv/bin/sprag` and curl are found."""
     binaries = folder / ".venv" / "bin"
     binaries.mkdir(parents=True)
-    (binaries / "sprag").write_text(f'#!/bin/sh\nexec "{sys.executable}" -m sprag.service.cli "$@"\n')
+    (binaries / "sprag").write_text(f'#!/bin/sh\nexec "{sys.executable}" -m sprag_study.service.cli "$@"\n')
     (binaries / "sprag").chmod(0o755)
     if shutil.which("curl") is None:
         stand_in = Path(__file__).with_name("curl.py")

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from sprag.service.figures.curves import curves_figure
-from sprag.service.jobs.local import run_here
-from sprag.service.results.curve_cases import draw, select
-from sprag.service.results.defaults import main_query
-from sprag.service.spec.document import parse_spec
-from sprag.worker import models
-from sprag.worker.planning import planner_of
-from sprag.worker.planning.curves import Why
+from sprag_study.service.figures.curves import curves_figure
+from sprag_study.service.jobs.local import run_here
+from sprag_study.service.results.curve_cases import draw, select
+from sprag_study.service.results.defaults import main_query
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.worker import models
+from sprag_study.worker.planning import planner_of
+from sprag_study.worker.planning.curves import Why
 
 ROOT = Path(__file__).resolve().parents[2]
 #: A finest step of the example, N*m.

@@ -14,7 +14,7 @@ from packaging.requirements import Requirement
 
 from tests.acceptance.processes import ROOT
 
-PACKAGES = ("sprag", "engine", "worker", "service", "migrations")  # folders; all are parts of sprag
+PACKAGES = ("sprag_study", "engine", "worker", "service", "migrations")  # folders; all are parts of sprag_study
 #: Extras of the program itself, beside its dependencies.
 RUNTIME = ("tables", "frames", "server", "report", "postgres", "cluster")
 CONSTRAINTS = (ROOT / "constraints.txt").read_text()
@@ -35,7 +35,7 @@ def test_every_library_the_project_names_is_constrained() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
     named = [*project["dependencies"], *(name for extra in extras.values() for name in extra)]
-    named = [name for name in named if not name.startswith("sprag[")] + ["cloudpickle"]  # the last is heyoka's
+    named = [name for name in named if not name.startswith("sprag-study[")] + ["cloudpickle"]  # the last is heyoka's
     constrained = {normal(line.split("==")[0]) for line in CONSTRAINTS.splitlines() if "==" in line}
     for requirement in named:
         found = re.match(r"[A-Za-z0-9._-]+", requirement)

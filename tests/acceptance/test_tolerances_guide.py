@@ -12,12 +12,12 @@ from typing import Any
 
 import pytest
 
-from sprag.service.answers.tolerances import RibbonLine, YieldLine
-from sprag.service.cli.shown import yield_text
-from sprag.service.jobs.local import run_here
-from sprag.service.spec.document import parse_spec
-from sprag.service.views.drives import RibbonQuery, RibbonView, YieldQuery, YieldView
-from sprag.service.views.study_view import found
+from sprag_study.service.answers.tolerances import RibbonLine, YieldLine
+from sprag_study.service.cli.shown import yield_text
+from sprag_study.service.jobs.local import run_here
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.views.drives import RibbonQuery, RibbonView, YieldQuery, YieldView
+from sprag_study.service.views.study_view import found
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "guide-tolerances.md").read_text(encoding="utf-8")

@@ -13,10 +13,10 @@ from pathlib import Path
 
 import pytest
 
-from sprag.service.http.web.manual import PAGES as MANUAL_PAGES
+from sprag_study.service.http.web.manual import PAGES as MANUAL_PAGES
 from tests.acceptance.processes import ROOT, environment
 
-PACKAGED = ("sprag/", "engine/", "worker/", "service/", "migrations/")
+PACKAGED = ("sprag_study/", "engine/", "worker/", "service/", "migrations/")
 #: Files for those of the site of the documentation, which `make docs` builds before a release is packed.
 SITE = ("index.html", "adr/0001-one.html", "figures/pages/new.png", "assets/main.1a2b.min.css", "style-hash.txt")
 STUDY = {
@@ -72,7 +72,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of an environment's programs that has the wheel, and this one's libraries without its `sprag`."""
+    """The folder of an environment's programs that has the wheel, and this one's libraries without its own."""
     folder = tmp_path_factory.mktemp("installed")
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True)
     own = Path(sysconfig.get_path("purelib", vars={"base": str(folder), "platbase": str(folder)}))
@@ -82,7 +82,10 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     done = run(*install, "--ignore-installed", wheel, cwd=folder)
     assert done.returncode == 0, done.stderr
     where = run(
-        python, "-c", "import sprag, sprag.service as service; print(service.__file__, sprag.__file__)", cwd=folder
+        python,
+        "-c",
+        "import sprag_study, sprag_study.service as service; print(service.__file__, sprag_study.__file__)",
+        cwd=folder,
     )
     assert where.stdout.count(str(own)) == 2, where
     return folder / "bin"
@@ -103,9 +106,18 @@ def hostile(tmp_path: Path) -> Path:
 def test_what_lies_in_the_folder_changes_nothing(installed: Path, hostile: Path) -> None:
     """Python itself puts the folder before all others for the module, not for the command."""
     told = run(installed / "sprag", "--version", cwd=hostile)
-    assert (told.returncode, told.stdout) == (0, f"sprag {version('sprag')}\n"), told.stderr
+    assert (told.returncode, told.stdout) == (0, f"sprag {version('sprag-study')}\n"), told.stderr
     done = run(
-        installed / "python", "-m", "sprag", "run", "study.json", "-o", "rows.csv", "--processes", "1", cwd=hostile
+        installed / "python",
+        "-m",
+        "sprag_study",
+        "run",
+        "study.json",
+        "-o",
+        "rows.csv",
+        "--processes",
+        "1",
+        cwd=hostile,
     )
     assert done.returncode == 0, done.stderr
     assert len((hostile / "rows.csv").read_text().splitlines()) == 1 + 3
@@ -114,7 +126,7 @@ def test_what_lies_in_the_folder_changes_nothing(installed: Path, hostile: Path)
 def test_a_script_in_that_folder_changes_nothing(installed: Path, hostile: Path) -> None:
     script = hostile / "script.py"
     run_it = "print(len(sprag.run('study.json', processes=1)), len(sprag.engine.ENGINE_VERSION) > 0)"
-    script.write_text(f"import sprag\n\nif __name__ == '__main__':\n    {run_it}\n")
+    script.write_text(f"import sprag_study as sprag\n\nif __name__ == '__main__':\n    {run_it}\n")
     done = run(installed / "python", script, cwd=hostile)
     assert (done.returncode, done.stdout) == (0, "3 True\n"), done.stderr
 
@@ -125,17 +137,17 @@ def test_the_wheel_has_what_the_program_reads(wheel: Path) -> None:
         (about,) = (archive.read(name).decode() for name in names if name.endswith(".dist-info/METADATA"))
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     wanted = {
-        name if name.startswith("sprag/") else f"sprag/{name}"
+        name if name.startswith("sprag_study/") else f"sprag_study/{name}"
         for name in listed.split("\0")
         if name.startswith(PACKAGED) and not (ROOT / name).is_symlink()
     }
     assert wanted <= names, sorted(wanted - names)
-    pages = {f"sprag/service/http/web/manual/{name}.md" for name in MANUAL_PAGES}
+    pages = {f"sprag_study/service/http/web/manual/{name}.md" for name in MANUAL_PAGES}
     assert pages <= names, sorted(pages - names)
-    assert {f"sprag/service/http/web/site/{name}" for name in SITE} <= names
+    assert {f"sprag_study/service/http/web/site/{name}" for name in SITE} <= names
     manual = {name for name in names if ".data/data/share/man/man1/" in name}
     assert {Path(name).name for name in manual} == {page.name for page in (ROOT / "docs" / "man").iterdir()}
-    assert {name.partition("/")[0] for name in names - manual if ".dist-info/" not in name} == {"sprag"}
+    assert {name.partition("/")[0] for name in names - manual if ".dist-info/" not in name} == {"sprag_study"}
     for line in ("Requires-Python: >=3.11", "Provides-Extra: server", "Provides-Extra: tables", "Keywords: "):
         assert line in about
     assert "License" not in about

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from sprag.service.storage.database import sqlite_files
-from sprag.service.storage.store import Store
-from sprag.worker.chunking import Chunking
+from sprag_study.service.storage.database import sqlite_files
+from sprag_study.service.storage.store import Store
+from sprag_study.worker.chunking import Chunking
 from tests.worker import fakes
 
 

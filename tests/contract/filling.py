@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from sprag.service.storage.store import Store
-from sprag.service.storage.studies.records import StudyRecord
-from sprag.worker import models
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.studies.records import StudyRecord
+from sprag_study.worker import models
 from tests.worker import fakes
 
 SPEC = {"sprag": 1, "name": "Füllung", "axes": [{"path": "shaft.load", "values": ["0.1 N*m"]}]}

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from sprag.service.actor import Actor, Door, act_as
-from sprag.service.spec.components import Component
-from sprag.service.storage.errors import ComponentNotFoundError, NotOwnerError, TooManyComponentsError
-from sprag.service.storage.people.audit import AuditFilter
-from sprag.service.storage.store import Store
+from sprag_study.service.actor import Actor, Door, act_as
+from sprag_study.service.spec.components import Component
+from sprag_study.service.storage.errors import ComponentNotFoundError, NotOwnerError, TooManyComponentsError
+from sprag_study.service.storage.people.audit import AuditFilter
+from sprag_study.service.storage.store import Store
 
 SPRING = Component("spring", "F-120", "store 3", {"spring_rate": "9 Н/мм"})
 CLUTCH = Component("clutch", "FW 20", "", {"coefficients": "0; 200"})
@@ -50,7 +50,7 @@ def test_a_component_of_another_user_is_not_changed(store: Store) -> None:
 
 
 def test_the_catalogue_has_a_limit(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sprag.service.storage.components.MAX_COMPONENTS", 20)
+    monkeypatch.setattr("sprag_study.service.storage.components.MAX_COMPONENTS", 20)
     many = [Component("spring", f"F-{number}", "", {"spring_rate": "1 N/mm"}) for number in range(20)]
     store.components.put(many)
     with pytest.raises(TooManyComponentsError):

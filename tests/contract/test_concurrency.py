@@ -7,8 +7,8 @@ from threading import Barrier, Thread
 
 import sqlalchemy as sa
 
-from sprag.service.storage.store import Store
-from sprag.service.storage.tables import STUDIES
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.tables import STUDIES
 from tests.worker import fakes
 
 WRITERS = 4

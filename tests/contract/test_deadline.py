@@ -9,15 +9,15 @@ from datetime import timedelta
 import numpy as np
 import pytest
 
-from sprag.service.storage.errors import NothingToRetryError
-from sprag.service.storage.store import Store
-from sprag.service.storage.studies.records import InTime, StudyRecord
-from sprag.worker import models
-from sprag.worker.chunking import Chunking
-from sprag.worker.models import ChunkResult
-from sprag.worker.ports import Chunk
-from sprag.worker.states import StudyState
-from sprag.worker.study import Axis, Study
+from sprag_study.service.storage.errors import NothingToRetryError
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.studies.records import InTime, StudyRecord
+from sprag_study.worker import models
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.models import ChunkResult
+from sprag_study.worker.ports import Chunk
+from sprag_study.worker.states import StudyState
+from sprag_study.worker.study import Axis, Study
 from tests.worker import fakes
 
 HOUR = timedelta(hours=1)

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.jobs.housekeeping import Scrubbing
-from sprag.service.storage.errors import DatabaseError, NothingToRetryError
-from sprag.service.storage.rows import digests
-from sprag.service.storage.rows.hashes import as_kept, digest_of, digests_of, row_words
-from sprag.service.storage.store import Store
-from sprag.service.storage.tables import CASE_KEYS, CHUNKS, ENDINGS, STUDIES, results_table
-from sprag.worker import models
-from sprag.worker.ports import Chunk
-from sprag.worker.states import StudyState
+from sprag_study.service.jobs.housekeeping import Scrubbing
+from sprag_study.service.storage.errors import DatabaseError, NothingToRetryError
+from sprag_study.service.storage.rows import digests
+from sprag_study.service.storage.rows.hashes import as_kept, digest_of, digests_of, row_words
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.tables import CASE_KEYS, CHUNKS, ENDINGS, STUDIES, results_table
+from sprag_study.worker import models
+from sprag_study.worker.ports import Chunk
+from sprag_study.worker.states import StudyState
 from tests.contract.filling import create, finish
 from tests.faults import refused
 from tests.worker import fakes

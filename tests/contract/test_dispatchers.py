@@ -7,14 +7,14 @@ from functools import partial
 
 import pytest
 
-from sprag.service.jobs.workers import worker_list
-from sprag.service.storage.readiness import Readiness
-from sprag.service.storage.store import Store
-from sprag.service.storage.work.dispatchers import run_owner
-from sprag.worker import fingerprint
-from sprag.worker.ports import EpochLostError, Finished, Peer
-from sprag.worker.reports import WorkerReport
-from sprag.worker.states import StudyState
+from sprag_study.service.jobs.workers import worker_list
+from sprag_study.service.storage.readiness import Readiness
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.work.dispatchers import run_owner
+from sprag_study.worker import fingerprint
+from sprag_study.worker.ports import EpochLostError, Finished, Peer
+from sprag_study.worker.reports import WorkerReport
+from sprag_study.worker.states import StudyState
 from tests.contract.filling import create
 from tests.worker import fakes
 

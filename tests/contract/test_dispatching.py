@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.storage.store import Store
-from sprag.service.storage.tables import CHUNKS
-from sprag.service.storage.work.dispatchers import CLAIMED, run_owner
-from sprag.worker.ports import Chunk, EpochLostError
-from sprag.worker.states import StudyState
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.tables import CHUNKS
+from sprag_study.service.storage.work.dispatchers import CLAIMED, run_owner
+from sprag_study.worker.ports import Chunk, EpochLostError
+from sprag_study.worker.states import StudyState
 from tests.contract.filling import SPEC, create, finish
 from tests.worker import fakes
 

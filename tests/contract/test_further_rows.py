@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.storage.rows.columns import records
-from sprag.service.storage.store import Store
-from sprag.service.storage.tables import further_table
-from sprag.worker import models
-from sprag.worker.models import ChunkResult, FurtherRows
-from sprag.worker.ports import Known
-from sprag.worker.study import Study
+from sprag_study.service.storage.rows.columns import records
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.tables import further_table
+from sprag_study.worker import models
+from sprag_study.worker.models import ChunkResult, FurtherRows
+from sprag_study.worker.ports import Known
+from sprag_study.worker.study import Study
 from tests.worker import fakes
 
 STARTS = {"count": 4, "seed": 1, "ranges": {"shaft.initial_speed": [0.0, 30.0]}, "values": {}}

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.storage.rows.origins import Origin, names_of
-from sprag.service.storage.store import Store
-from sprag.worker import fingerprint, models
-from sprag.worker.models import ChunkResult
-from sprag.worker.ports import Chunk, EpochLostError, Finished
-from sprag.worker.reuse import no_cases
-from sprag.worker.states import StudyState
+from sprag_study.service.storage.rows.origins import Origin, names_of
+from sprag_study.service.storage.store import Store
+from sprag_study.worker import fingerprint, models
+from sprag_study.worker.models import ChunkResult
+from sprag_study.worker.ports import Chunk, EpochLostError, Finished
+from sprag_study.worker.reuse import no_cases
+from sprag_study.worker.states import StudyState
 from tests.contract.filling import SPEC, create
 from tests.worker import fakes
 

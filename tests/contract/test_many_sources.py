@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.storage.rows import reuse
-from sprag.service.storage.rows.case_keys import TOO_MANY, add_keys
-from sprag.service.storage.store import Store
-from sprag.service.storage.studies import studies
-from sprag.service.storage.studies.records import StudyRecord
-from sprag.service.storage.tables import CASE_KEYS, CHUNKS, STUDIES
-from sprag.worker import reuse as physics
-from sprag.worker.case_keys import case_keys
-from sprag.worker.chunking import Chunking
-from sprag.worker.states import StudyState
-from sprag.worker.study import Axis, Study
+from sprag_study.service.storage.rows import reuse
+from sprag_study.service.storage.rows.case_keys import TOO_MANY, add_keys
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.studies import studies
+from sprag_study.service.storage.studies.records import StudyRecord
+from sprag_study.service.storage.tables import CASE_KEYS, CHUNKS, STUDIES
+from sprag_study.worker import reuse as physics
+from sprag_study.worker.case_keys import case_keys
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.states import StudyState
+from sprag_study.worker.study import Axis, Study
 from tests import postgres
 from tests.worker import fakes
 
@@ -182,7 +182,7 @@ def test_studies_of_before_get_keys_and_lose_nothing(store: Store) -> None:
 
 
 def test_studies_with_many_cases_have_no_keys_and_are_found(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sprag.service.storage.rows.case_keys.MAX_KEYED", 2)
+    monkeypatch.setattr("sprag_study.service.storage.rows.case_keys.MAX_KEYED", 2)
     finished(store, over_loads(0.1, 0.2, 0.3))
     assert store.reuse.count(over_loads(0.2, 0.3)) == 2
     with store.session.read() as connection:

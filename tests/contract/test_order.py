@@ -6,16 +6,16 @@ from datetime import timedelta
 
 import pytest
 
-from sprag.service.actor import Actor, Door, act_as
-from sprag.service.faults import FaultError
-from sprag.service.spec.labels import StudyChange, read_change
-from sprag.service.spec.report import SpecError
-from sprag.service.storage.errors import NotOwnerError, PageTokenError, StudyNotFoundError
-from sprag.service.storage.people.audit import AuditFilter
-from sprag.service.storage.store import Store
-from sprag.service.storage.studies.listing import StudyFilter, StudyOrder
-from sprag.worker.limits import MAX_TAGS
-from sprag.worker.states import StudyState
+from sprag_study.service.actor import Actor, Door, act_as
+from sprag_study.service.faults import FaultError
+from sprag_study.service.spec.labels import StudyChange, read_change
+from sprag_study.service.spec.report import SpecError
+from sprag_study.service.storage.errors import NotOwnerError, PageTokenError, StudyNotFoundError
+from sprag_study.service.storage.people.audit import AuditFilter
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.studies.listing import StudyFilter, StudyOrder
+from sprag_study.worker.limits import MAX_TAGS
+from sprag_study.worker.states import StudyState
 from tests.contract.filling import create, finish
 from tests.worker.fakes import HandClock
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.service.storage.rows import rows as cases_of_store
-from sprag.service.storage.store import Store
-from sprag.worker import models
-from sprag.worker.chunking import Chunking
+from sprag_study.service.storage.rows import rows as cases_of_store
+from sprag_study.service.storage.store import Store
+from sprag_study.worker import models
+from sprag_study.worker.chunking import Chunking
 from tests.contract.filling import SPEC, create, finish
 from tests.worker import fakes
 

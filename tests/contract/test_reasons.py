@@ -8,16 +8,16 @@ from datetime import UTC, datetime, time
 import pytest
 import sqlalchemy as sa
 
-from sprag.sentences import Amount, Sentence
-from sprag.service.languages import language, recorded
-from sprag.service.reading.reader import told
-from sprag.service.schedules.fields import read_fields
-from sprag.service.schedules.outcomes import Outcome
-from sprag.service.schedules.policies import DueTime
-from sprag.service.schedules.times import Window
-from sprag.service.storage.schedules.tables import SCHEDULE_RUNS
-from sprag.service.storage.store import Store
-from sprag.service.storage.tables import STUDIES
+from sprag_study.sentences import Amount, Sentence
+from sprag_study.service.languages import language, recorded
+from sprag_study.service.reading.reader import told
+from sprag_study.service.schedules.fields import read_fields
+from sprag_study.service.schedules.outcomes import Outcome
+from sprag_study.service.schedules.policies import DueTime
+from sprag_study.service.schedules.times import Window
+from sprag_study.service.storage.schedules.tables import SCHEDULE_RUNS
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.tables import STUDIES
 from tests.contract.filling import create
 from tests.service.timed_spec import SPEC
 

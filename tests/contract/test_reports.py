@@ -5,12 +5,12 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
 
-from sprag.service.jobs.nights import conclude_runs
-from sprag.service.jobs.scheduler import Scheduler
-from sprag.service.schedules.fields import read_fields
-from sprag.service.schedules.outcomes import Result
-from sprag.service.storage.schedules.reports import CLAIM, ReportState
-from sprag.service.storage.store import Store
+from sprag_study.service.jobs.nights import conclude_runs
+from sprag_study.service.jobs.scheduler import Scheduler
+from sprag_study.service.schedules.fields import read_fields
+from sprag_study.service.schedules.outcomes import Result
+from sprag_study.service.storage.schedules.reports import CLAIM, ReportState
+from sprag_study.service.storage.store import Store
 from tests.service.timed_spec import SPEC
 from tests.worker import fakes
 

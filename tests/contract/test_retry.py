@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sprag.service.storage.errors import NothingToRetryError, StudyNotFoundError
-from sprag.service.storage.store import Store
-from sprag.service.storage.studies.records import StudyRecord
-from sprag.worker import models
-from sprag.worker.chunking import Chunking
-from sprag.worker.models import ChunkResult
-from sprag.worker.ports import Chunk, Finished
-from sprag.worker.states import StudyState, TransitionError
+from sprag_study.service.storage.errors import NothingToRetryError, StudyNotFoundError
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.studies.records import StudyRecord
+from sprag_study.worker import models
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.models import ChunkResult
+from sprag_study.worker.ports import Chunk, Finished
+from sprag_study.worker.states import StudyState, TransitionError
 from tests import postgres
 from tests.worker import fakes
 

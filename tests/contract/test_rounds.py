@@ -12,19 +12,19 @@ import pytest
 import sqlalchemy as sa
 from numpy.typing import NDArray
 
-from sprag.service.storage.errors import DatabaseError, StudyNotFoundError
-from sprag.service.storage.part import SystemClock
-from sprag.service.storage.store import Store
-from sprag.service.storage.studies.records import StudyRecord
-from sprag.service.storage.tables import ROUNDS, results_table
-from sprag.worker import models
-from sprag.worker.dispatcher import Dispatcher
-from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.models import ChunkResult, ChunkTask
-from sprag.worker.ports import EpochLostError
-from sprag.worker.rounds import PlanError, Rounds
-from sprag.worker.states import StudyState
-from sprag.worker.study import Study
+from sprag_study.service.storage.errors import DatabaseError, StudyNotFoundError
+from sprag_study.service.storage.part import SystemClock
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.studies.records import StudyRecord
+from sprag_study.service.storage.tables import ROUNDS, results_table
+from sprag_study.worker import models
+from sprag_study.worker.dispatcher import Dispatcher
+from sprag_study.worker.executors.inline import InlineExecutor
+from sprag_study.worker.models import ChunkResult, ChunkTask
+from sprag_study.worker.ports import EpochLostError
+from sprag_study.worker.rounds import PlanError, Rounds
+from sprag_study.worker.states import StudyState
+from sprag_study.worker.study import Study
 from tests.contract.filling import SPEC
 from tests.faults import refused
 from tests.worker import fakes

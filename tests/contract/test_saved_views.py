@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.actor import Actor, Door, act_as
-from sprag.service.faults import FaultError
-from sprag.service.spec.saved_views import View, ViewChange
-from sprag.service.storage.errors import NotOwnerError, StudyNotFoundError, TooManyViewsError, ViewNotFoundError
-from sprag.service.storage.people.audit import AuditFilter
-from sprag.service.storage.saved_views import SAVED_VIEWS
-from sprag.worker.limits import MAX_REPORT_FIGURES
+from sprag_study.service.actor import Actor, Door, act_as
+from sprag_study.service.faults import FaultError
+from sprag_study.service.spec.saved_views import View, ViewChange
+from sprag_study.service.storage.errors import NotOwnerError, StudyNotFoundError, TooManyViewsError, ViewNotFoundError
+from sprag_study.service.storage.people.audit import AuditFilter
+from sprag_study.service.storage.saved_views import SAVED_VIEWS
+from sprag_study.worker.limits import MAX_REPORT_FIGURES
 from tests.contract.filling import create, finish
 
 if TYPE_CHECKING:
-    from sprag.service.storage.store import Store
+    from sprag_study.service.storage.store import Store
 
 LIST = View("studies", "failed", "state=failed")
 
@@ -87,7 +87,7 @@ def test_reports_and_databases_have_limits(store: Store, monkeypatch: pytest.Mon
         store.views.save(figure(study, "one more"))
     assert [(fault.where, fault.code) for fault in caught.value.faults] == [("/in_report", "too-many")]
     assert len(store.views.all()) == MAX_REPORT_FIGURES  # nothing of it is left
-    monkeypatch.setattr("sprag.service.storage.saved_views.MAX_VIEWS", 1)
+    monkeypatch.setattr("sprag_study.service.storage.saved_views.MAX_VIEWS", 1)
     store.views.save(LIST)  # figures do not count
     with pytest.raises(TooManyViewsError):
         store.views.save(View("studies", "another", "state=failed"))

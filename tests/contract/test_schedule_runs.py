@@ -8,14 +8,14 @@ from threading import Thread
 
 import pytest
 
-from sprag.service.schedules.fields import change_fields, read_fields
-from sprag.service.schedules.outcomes import Result
-from sprag.service.schedules.policies import DueTime
-from sprag.service.storage.errors import RunClosedError
-from sprag.service.storage.people.audit import AuditFilter
-from sprag.service.storage.schedules.runs import OpenRun, RunState, ScheduleRecord
-from sprag.service.storage.store import Store
-from sprag.service.storage.studies.study_row import study_row
+from sprag_study.service.schedules.fields import change_fields, read_fields
+from sprag_study.service.schedules.outcomes import Result
+from sprag_study.service.schedules.policies import DueTime
+from sprag_study.service.storage.errors import RunClosedError
+from sprag_study.service.storage.people.audit import AuditFilter
+from sprag_study.service.storage.schedules.runs import OpenRun, RunState, ScheduleRecord
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.studies.study_row import study_row
 from tests.service.timed_spec import SPEC
 from tests.worker import fakes
 

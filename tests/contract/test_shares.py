@@ -7,20 +7,20 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from sprag.service.actor import Actor, Door, Role, act_as
-from sprag.service.faults import FaultError
-from sprag.service.spec.components import Component
-from sprag.service.spec.saved_views import View
-from sprag.service.storage.errors import TooManyComponentsError, TooManyViewsError
-from sprag.service.storage.people.people import Quota
-from sprag.service.storage.studies.records import StudyRecord
-from sprag.service.storage.studies.study_row import study_row
-from sprag.worker.states import StudyState
+from sprag_study.service.actor import Actor, Door, Role, act_as
+from sprag_study.service.faults import FaultError
+from sprag_study.service.spec.components import Component
+from sprag_study.service.spec.saved_views import View
+from sprag_study.service.storage.errors import TooManyComponentsError, TooManyViewsError
+from sprag_study.service.storage.people.people import Quota
+from sprag_study.service.storage.studies.records import StudyRecord
+from sprag_study.service.storage.studies.study_row import study_row
+from sprag_study.worker.states import StudyState
 from tests.contract.filling import create, finish
 from tests.worker import fakes
 
 if TYPE_CHECKING:
-    from sprag.service.storage.store import Store
+    from sprag_study.service.storage.store import Store
 
 DORA, EMIL, FINN = (Actor(Door.API, name, "192.0.2.1", name, everything=False) for name in ("dora", "emil", "finn"))
 ADA = Actor(Door.API, "ada", "192.0.2.1", "ada")
@@ -61,7 +61,7 @@ def test_nobody_fills_the_queue(office: Store) -> None:
 
 
 def test_nobody_fills_it_with_ended_studies_that_are_run_again(office: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sprag.service.storage.studies.studies.MAX_WAITING_STUDIES", 4)
+    monkeypatch.setattr("sprag_study.service.storage.studies.studies.MAX_WAITING_STUDIES", 4)
     with act_as(DORA):
         made = [create(office, 3) for _ in range(3)]
     for record in made:
@@ -79,8 +79,8 @@ def test_without_users_the_whole_queue_is_there(store: Store) -> None:
 
 
 def test_nobody_takes_all_views_and_components(office: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sprag.service.storage.saved_views.MAX_VIEWS", 4)
-    monkeypatch.setattr("sprag.service.storage.components.MAX_COMPONENTS", 4)
+    monkeypatch.setattr("sprag_study.service.storage.saved_views.MAX_VIEWS", 4)
+    monkeypatch.setattr("sprag_study.service.storage.components.MAX_COMPONENTS", 4)
     for actor, most in ((DORA, 2), (EMIL, 1)):
         with act_as(actor):
             views = [View("studies", f"{actor.name} {number}", "") for number in range(most + 1)]
@@ -140,7 +140,7 @@ def held_at_deadline(store: Store, clock: fakes.HandClock, count: int) -> list[S
 def test_nobody_fills_the_queue_with_studies_that_were_held_at_their_deadline(
     office: Store, clock: fakes.HandClock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sprag.service.storage.studies.studies.MAX_WAITING_STUDIES", 4, raising=False)
+    monkeypatch.setattr("sprag_study.service.storage.studies.studies.MAX_WAITING_STUDIES", 4, raising=False)
     with act_as(DORA):
         made = held_at_deadline(office, clock, 3)
         for record in made[:2]:

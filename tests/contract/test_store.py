@@ -7,13 +7,18 @@ from functools import partial
 
 import pytest
 
-from sprag.service.storage.database import sqlite_files
-from sprag.service.storage.errors import IdempotencyConflictError, PageTokenError, StudyBusyError, StudyNotFoundError
-from sprag.service.storage.store import Store
-from sprag.service.storage.studies.listing import StudyFilter
-from sprag.worker import models
-from sprag.worker.ports import Chunk
-from sprag.worker.states import StudyState, TransitionError
+from sprag_study.service.storage.database import sqlite_files
+from sprag_study.service.storage.errors import (
+    IdempotencyConflictError,
+    PageTokenError,
+    StudyBusyError,
+    StudyNotFoundError,
+)
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.studies.listing import StudyFilter
+from sprag_study.worker import models
+from sprag_study.worker.ports import Chunk
+from sprag_study.worker.states import StudyState, TransitionError
 from tests.contract.filling import SPEC, create, finish
 from tests.worker import fakes
 

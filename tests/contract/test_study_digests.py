@@ -5,16 +5,16 @@ from __future__ import annotations
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.jobs.housekeeping import Scrubbing
-from sprag.service.storage.errors import DatabaseError
-from sprag.service.storage.store import Store
-from sprag.service.storage.studies.study_digests import WITH_DIGEST, digest_of_study
-from sprag.service.storage.tables import CHUNKS, ENDINGS, STUDIES
-from sprag.worker.dispatcher import Dispatcher
-from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.models import ChunkResult, ChunkTask
-from sprag.worker.ports import UnreadableStudyError
-from sprag.worker.states import StudyState
+from sprag_study.service.jobs.housekeeping import Scrubbing
+from sprag_study.service.storage.errors import DatabaseError
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.studies.study_digests import WITH_DIGEST, digest_of_study
+from sprag_study.service.storage.tables import CHUNKS, ENDINGS, STUDIES
+from sprag_study.worker.dispatcher import Dispatcher
+from sprag_study.worker.executors.inline import InlineExecutor
+from sprag_study.worker.models import ChunkResult, ChunkTask
+from sprag_study.worker.ports import UnreadableStudyError
+from sprag_study.worker.states import StudyState
 from tests.contract.filling import create, finish
 from tests.faults import refused
 from tests.worker import fakes

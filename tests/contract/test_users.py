@@ -13,20 +13,25 @@ from typing import Any
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.actor import Actor, Door, Role, act_as, acting, of_machine
-from sprag.service.faults import FaultError
-from sprag.service.spec.components import Component
-from sprag.service.spec.labels import StudyChange
-from sprag.service.spec.saved_views import View
-from sprag.service.storage.errors import IdempotencyConflictError, NotOwnerError, UserExistsError, UserNotFoundError
-from sprag.service.storage.people.audit import AuditFilter
-from sprag.service.storage.people.people import STUDY_BYTES, TEXTS, Quota
-from sprag.service.storage.people.scopes import TokenScope
-from sprag.service.storage.store import Store
-from sprag.service.storage.studies import studies as studies_of_store
-from sprag.service.storage.tables import STUDIES
-from sprag.worker.limits import MAX_NOTES_LENGTH
-from sprag.worker.states import StudyState
+from sprag_study.service.actor import Actor, Door, Role, act_as, acting, of_machine
+from sprag_study.service.faults import FaultError
+from sprag_study.service.spec.components import Component
+from sprag_study.service.spec.labels import StudyChange
+from sprag_study.service.spec.saved_views import View
+from sprag_study.service.storage.errors import (
+    IdempotencyConflictError,
+    NotOwnerError,
+    UserExistsError,
+    UserNotFoundError,
+)
+from sprag_study.service.storage.people.audit import AuditFilter
+from sprag_study.service.storage.people.people import STUDY_BYTES, TEXTS, Quota
+from sprag_study.service.storage.people.scopes import TokenScope
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.studies import studies as studies_of_store
+from sprag_study.service.storage.tables import STUDIES
+from sprag_study.worker.limits import MAX_NOTES_LENGTH
+from sprag_study.worker.states import StudyState
 from tests.contract.filling import create, finish
 from tests.worker import fakes
 
@@ -249,7 +254,7 @@ def test_an_ended_study_is_restored_over_the_quota_of_cases(store: Store) -> Non
 
 
 def _row(store: Store) -> dict[str, Any]:
-    from sprag.service.storage.studies.study_row import study_row
+    from sprag_study.service.storage.studies.study_row import study_row
 
     return study_row({}, fakes.study(3), store.dispatchers.chunking)
 

@@ -10,12 +10,12 @@ import pytest
 from numpy.typing import NDArray
 
 from benchmarks.workloads import W1
-from sprag.engine.run import Run, SettledRun
-from sprag.engine.vibration_drive import newton, orbits, search
-from sprag.engine.vibration_drive.automaton import Clutch, Shaft
-from sprag.engine.vibration_drive.cases import case_matrix
-from sprag.engine.vibration_drive.kernel import kernel, lane_count, order_for
-from sprag.engine.vibration_drive.strobes import (
+from sprag_study.engine.run import Run, SettledRun
+from sprag_study.engine.vibration_drive import newton, orbits, search
+from sprag_study.engine.vibration_drive.automaton import Clutch, Shaft
+from sprag_study.engine.vibration_drive.cases import case_matrix
+from sprag_study.engine.vibration_drive.kernel import kernel, lane_count, order_for
+from sprag_study.engine.vibration_drive.strobes import (
     ANGLE,
     CLUTCH,
     FALLS,

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.run import Run, Span
-from sprag.engine.vibration_drive.cases import Column, case_matrix
-from sprag.engine.vibration_drive.parameters import PARAMETERS
-from sprag.engine.vibration_drive.simulate import trajectory
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.run import Run, Span
+from sprag_study.engine.vibration_drive.cases import Column, case_matrix
+from sprag_study.engine.vibration_drive.parameters import PARAMETERS
+from sprag_study.engine.vibration_drive.simulate import trajectory
 from tests.engine.vibration_drive.drive import Columns, Results, batch_of, clutch, drive, one, pendulum, periods
 
 RUN = periods(6.0, 3.0, 6.0)
@@ -167,7 +167,7 @@ def test_the_step_budget_follows_the_duration_and_the_fastest_motion_of_each_cas
 
 def test_a_slow_excitation_has_steps_for_the_motion_of_the_pendulum_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     """As in a run of 20,000 periods at 0.5 Hz, which takes more than five million steps."""
-    monkeypatch.setattr("sprag.engine.run._LEAST_STEPS", 200)
+    monkeypatch.setattr("sprag_study.engine.run._LEAST_STEPS", 200)
     slow = drive(1, excitation__frequency=0.1, excitation__amplitude_x=1.0, excitation__amplitude_y=0.0)
     hanging = slow | clutch(0.0, 1e-3) | pendulum(0, arm=-0.03, spring_rate=0.0) | {"excitation.frequency": 0.01}
     for columns in (slow, hanging):
@@ -176,7 +176,7 @@ def test_a_slow_excitation_has_steps_for_the_motion_of_the_pendulum_itself(monke
 
 def test_a_run_with_more_steps_than_the_least_budget_ends_well(monkeypatch: pytest.MonkeyPatch) -> None:
     """As a run of 300,000 periods does, which takes 7.2 million steps: the duration gives the budget, not the floor."""
-    monkeypatch.setattr("sprag.engine.run._LEAST_STEPS", 200)
+    monkeypatch.setattr("sprag_study.engine.run._LEAST_STEPS", 200)
     row = one(drive(1), periods(30.0, 10.0, 30.0))
     assert row["run.steps"] > 400
     assert Results(drive(1), periods(30.0, 10.0, 30.0, max_steps=200), 1).endings == [Ending.STEP_BUDGET]

@@ -10,7 +10,7 @@ import sys
 import numpy as np
 import pytest
 
-from sprag.engine import faults
+from sprag_study.engine import faults
 
 COLUMNS = {"shaft.load": np.array([0.1, 0.25, 0.3]), "excitation.frequency": 25.0}
 
@@ -63,7 +63,7 @@ def test_words_that_are_not_understood_are_no_fault_that_is_passed_over(
 
 
 def test_a_crash_is_the_end_of_the_process() -> None:
-    program = "from sprag.engine.faults import inject; inject({'shaft.load': 0.25}, 1); print('alive')"
+    program = "from sprag_study.engine.faults import inject; inject({'shaft.load': 0.25}, 1); print('alive')"
     wanted = {faults.ALLOWED_VARIABLE: "yes", faults.FAULTS_VARIABLE: "crash shaft.load=0.25"}
     ended = subprocess.run([sys.executable, "-c", program], env=os.environ | wanted, capture_output=True, check=False)
     assert (ended.returncode, ended.stdout) == (-signal.SIGKILL, b"")

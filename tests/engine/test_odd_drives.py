@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from sprag.engine.endings import Ending
+from sprag_study.engine.endings import Ending
 from tests.engine.odd_drives import idle_drive, odd_drive, without
 from tests.engine.vibration_drive.drive import Columns, Results, batch_of, clutch, one, pendulum, periods
 from tests.engine.vibration_drive.reference_run import Drive
@@ -77,7 +77,7 @@ def test_clutches_that_meet_share_one_consistent_state(seed: int) -> None:
         columns |= own
         moments.append(0.5 * 0.03 * 9.80665 * math.sin(angle) - 9000.0 * 0.05**2 * angle)
         inertias.append(inertia)
-    from sprag.engine.vibration_drive.simulate import trajectory
+    from sprag_study.engine.vibration_drive.simulate import trajectory
 
     moment = trajectory(columns, periods(1e-8, 0, 1e-8), np.array([1e-9, 5e-9]))
     acceleration = moment.values[-1, moment.names.index("shaft.acceleration")]

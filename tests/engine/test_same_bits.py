@@ -9,7 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from sprag import engine
+from sprag_study import engine
 from tests.worker import fakes
 
 #: Not in the way of a case's results: the fit of a clutch, the engagements that are computed for one case, and
@@ -70,9 +70,9 @@ def test_results_do_not_go_through_blas_or_functions_of_libraries() -> None:
 SCRIPT = """
 import hashlib, json, math
 import numpy as np
-from sprag.service.presets import preset_text
-from sprag.service.spec.document import load_spec, parse_spec
-from sprag.worker import models
+from sprag_study.service.presets import preset_text
+from sprag_study.service.spec.document import load_spec, parse_spec
+from sprag_study.worker import models
 
 def digest(values):
     return hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()

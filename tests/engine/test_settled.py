@@ -13,18 +13,18 @@ from numpy.typing import NDArray
 
 from benchmarks.settled import NOT_COMPARED
 from benchmarks.workloads import W1
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.run import Run, SettledRun, Span
-from sprag.engine.vibration_drive.cases import case_matrix, with_lengths
-from sprag.engine.vibration_drive.characteristics import characteristics, combined
-from sprag.engine.vibration_drive.integration import integrate
-from sprag.engine.vibration_drive.kernel import kernel, lane_count, order_for
-from sprag.engine.vibration_drive.no_load import limit_speed
-from sprag.engine.vibration_drive.regimes import Regime, settled_infos
-from sprag.engine.vibration_drive.results import result_infos
-from sprag.engine.vibration_drive.settle import SettledBatch, settle
-from sprag.engine.vibration_drive.simulate import simulate
-from sprag.engine.vibration_drive.strobes import BEGIN, FRACTION
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.run import Run, SettledRun, Span
+from sprag_study.engine.vibration_drive.cases import case_matrix, with_lengths
+from sprag_study.engine.vibration_drive.characteristics import characteristics, combined
+from sprag_study.engine.vibration_drive.integration import integrate
+from sprag_study.engine.vibration_drive.kernel import kernel, lane_count, order_for
+from sprag_study.engine.vibration_drive.no_load import limit_speed
+from sprag_study.engine.vibration_drive.regimes import Regime, settled_infos
+from sprag_study.engine.vibration_drive.results import result_infos
+from sprag_study.engine.vibration_drive.settle import SettledBatch, settle
+from sprag_study.engine.vibration_drive.simulate import simulate
+from sprag_study.engine.vibration_drive.strobes import BEGIN, FRACTION
 
 REFERENCE = Path(__file__).resolve().parents[1] / "data" / "reference" / "settled.json"
 

@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 
 from benchmarks.settled import deviations, random_drives
 from benchmarks.workloads import W2
-from sprag.engine.run import Run, SettledRun, Span
-from sprag.engine.vibration_drive import orbits
-from sprag.engine.vibration_drive.automaton import Shaft
-from sprag.engine.vibration_drive.cases import case_matrix, pendulum_count, with_lengths
-from sprag.engine.vibration_drive.characteristics import characteristics
-from sprag.engine.vibration_drive.integration import integrate
-from sprag.engine.vibration_drive.kernel import kernel_of
-from sprag.engine.vibration_drive.regimes import Regime, settled_infos
-from sprag.engine.vibration_drive.results import result_infos
-from sprag.engine.vibration_drive.settle import SettledBatch, settle
-from sprag.engine.vibration_drive.simulate import simulate
-from sprag.engine.vibration_drive.strobes import BEGIN, SHAFT, SHAFT_SPEED, width
+from sprag_study.engine.run import Run, SettledRun, Span
+from sprag_study.engine.vibration_drive import orbits
+from sprag_study.engine.vibration_drive.automaton import Shaft
+from sprag_study.engine.vibration_drive.cases import case_matrix, pendulum_count, with_lengths
+from sprag_study.engine.vibration_drive.characteristics import characteristics
+from sprag_study.engine.vibration_drive.integration import integrate
+from sprag_study.engine.vibration_drive.kernel import kernel_of
+from sprag_study.engine.vibration_drive.regimes import Regime, settled_infos
+from sprag_study.engine.vibration_drive.results import result_infos
+from sprag_study.engine.vibration_drive.settle import SettledBatch, settle
+from sprag_study.engine.vibration_drive.simulate import simulate
+from sprag_study.engine.vibration_drive.strobes import BEGIN, SHAFT, SHAFT_SPEED, width
 
 Floats = NDArray[np.float64]
 

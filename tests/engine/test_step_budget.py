@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sprag.engine import run as run_module
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.run import SettledRun
-from sprag.engine.vibration_drive import irregular, search
-from sprag.engine.vibration_drive.integration import Integration, integrate
-from sprag.engine.vibration_drive.layout import OUT_STEPS
-from sprag.engine.vibration_drive.settle import settle
+from sprag_study.engine import run as run_module
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.run import SettledRun
+from sprag_study.engine.vibration_drive import irregular, search
+from sprag_study.engine.vibration_drive.integration import Integration, integrate
+from sprag_study.engine.vibration_drive.layout import OUT_STEPS
+from sprag_study.engine.vibration_drive.settle import settle
 from tests.engine.vibration_drive.drive import batch_of, drive
 
 #: A drive that settles within 60 periods, and one whose orbit a search of 1,000 periods does not find.

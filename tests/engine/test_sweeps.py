@@ -9,16 +9,16 @@ import pytest
 from numpy.typing import NDArray
 
 from benchmarks.workloads import W1
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.run import SettledRun
-from sprag.engine.vibration_drive.engagements import settled_engagements
-from sprag.engine.vibration_drive.portrait import settled_portrait
-from sprag.engine.vibration_drive.regimes import Regime, settled_infos
-from sprag.engine.vibration_drive.settle import SettledBatch, settle
-from sprag.engine.vibration_drive.simulate import trajectory
-from sprag.engine.vibration_drive.start_states import end_state
-from sprag.engine.vibration_drive.strobes import ANGLE, BEGIN, FRACTION, SHAFT_SPEED, SHAFT_WIDTH, continued
-from sprag.engine.vibration_drive.sweep import Begun, sweep, whole_periods
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.run import SettledRun
+from sprag_study.engine.vibration_drive.engagements import settled_engagements
+from sprag_study.engine.vibration_drive.portrait import settled_portrait
+from sprag_study.engine.vibration_drive.regimes import Regime, settled_infos
+from sprag_study.engine.vibration_drive.settle import SettledBatch, settle
+from sprag_study.engine.vibration_drive.simulate import trajectory
+from sprag_study.engine.vibration_drive.start_states import end_state
+from sprag_study.engine.vibration_drive.strobes import ANGLE, BEGIN, FRACTION, SHAFT_SPEED, SHAFT_WIDTH, continued
+from sprag_study.engine.vibration_drive.sweep import Begun, sweep, whole_periods
 
 NAMES = [info.name for info in settled_infos(1)]
 #: At 16.475 Hz the drive has two motions: one reached from below and from rest, the other from above.

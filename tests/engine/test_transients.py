@@ -7,10 +7,10 @@ import pytest
 
 from benchmarks.not_settled import drives, judge, reference
 from benchmarks.workloads import W1
-from sprag.engine.run import Run, Span
-from sprag.engine.vibration_drive.results import result_infos
-from sprag.engine.vibration_drive.simulate import simulate
-from sprag.engine.vibration_drive.transients import simulate_judged
+from sprag_study.engine.run import Run, Span
+from sprag_study.engine.vibration_drive.results import result_infos
+from sprag_study.engine.vibration_drive.simulate import simulate
+from sprag_study.engine.vibration_drive.transients import simulate_judged
 
 SPEED = [info.name for info in result_infos(1)].index("shaft.speed.mean")
 

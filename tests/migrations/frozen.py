@@ -16,10 +16,10 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
-from sprag.service.storage.database.sqlite_files import sqlite_driver
-from sprag.service.storage.store import Store
-from sprag.service.storage.tables import HEAD_REVISION
-from sprag.worker.chunking import Chunking
+from sprag_study.service.storage.database.sqlite_files import sqlite_driver
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.tables import HEAD_REVISION
+from sprag_study.worker.chunking import Chunking
 from tests import postgres
 from tests.worker import fakes
 

@@ -12,18 +12,18 @@ import pytest
 import sqlalchemy as sa
 from numpy.typing import NDArray
 
-from sprag import migrations
-from sprag.migrations import REVISIONS
-from sprag.service.actor import Actor, Door, act_as
-from sprag.service.spec.document import parse_spec
-from sprag.service.storage import maintenance
-from sprag.service.storage.database.session import Session
-from sprag.service.storage.database.sqlite_files import sqlite_driver
-from sprag.service.storage.errors import DatabaseError, SchemaError
-from sprag.service.storage.store import Store
-from sprag.service.storage.tables import HEAD_REVISION
-from sprag.worker import models
-from sprag.worker.states import StudyState
+from sprag_study import migrations
+from sprag_study.migrations import REVISIONS
+from sprag_study.service.actor import Actor, Door, act_as
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.storage import maintenance
+from sprag_study.service.storage.database.session import Session
+from sprag_study.service.storage.database.sqlite_files import sqlite_driver
+from sprag_study.service.storage.errors import DatabaseError, SchemaError
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.tables import HEAD_REVISION
+from sprag_study.worker import models
+from sprag_study.worker.states import StudyState
 from tests import postgres
 from tests.faults import refused
 from tests.migrations import frozen

@@ -16,15 +16,15 @@ import pytest
 from anyio.from_thread import BlockingPortal, start_blocking_portal
 from fastapi import FastAPI
 
-from sprag.service.client import Client
-from sprag.service.http.app import chunking, create_app
-from sprag.service.languages.elsewhere import speak
-from sprag.service.settings import Settings
-from sprag.service.storage.database.session import in_one_moment
-from sprag.service.storage.store import Store
-from sprag.worker import models
-from sprag.worker.models import ChunkResult, KernelShape
-from sprag.worker.study import Study
+from sprag_study.service.client import Client
+from sprag_study.service.http.app import chunking, create_app
+from sprag_study.service.languages.elsewhere import speak
+from sprag_study.service.settings import Settings
+from sprag_study.service.storage.database.session import in_one_moment
+from sprag_study.service.storage.store import Store
+from sprag_study.worker import models
+from sprag_study.worker.models import ChunkResult, KernelShape
+from sprag_study.worker.study import Study
 from tests.service.timed_spec import SPEC
 
 API = "/api/v1"

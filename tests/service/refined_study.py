@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sprag.service.spec.document import parse_spec
-from sprag.service.storage.studies.records import CaseColumns
-from sprag.worker import models
-from sprag.worker.models import ChunkResult
-from sprag.worker.planning import planner_of
-from sprag.worker.planning.rounds import Rows
-from sprag.worker.rounds import Rounds
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.storage.studies.records import CaseColumns
+from sprag_study.worker import models
+from sprag_study.worker.models import ChunkResult
+from sprag_study.worker.planning import planner_of
+from sprag_study.worker.planning.rounds import Rows
+from sprag_study.worker.rounds import Rounds
 from tests.service.spec_sample import changed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
     from tests.service.conftest import Service
 
 SPEED, TORQUE, EFFICIENCY = "shaft.speed.mean", "torque.max", "efficiency"

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from sprag.service.settings import Settings
-from sprag.service.storage.database.session import Session
-from sprag.service.storage.tables import METADATA, results_table
-from sprag.worker import models
-from sprag.worker.models.model import Model
+from sprag_study.service.settings import Settings
+from sprag_study.service.storage.database.session import Session
+from sprag_study.service.storage.tables import METADATA, results_table
+from sprag_study.worker import models
+from sprag_study.worker.models.model import Model
 
 
 @contextmanager

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.storage.store import Store
-from sprag.worker import models
-from sprag.worker.models import ChunkResult
-from sprag.worker.study import Study
+from sprag_study.service.storage.store import Store
+from sprag_study.worker import models
+from sprag_study.worker.models import ChunkResult
+from sprag_study.worker.study import Study
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service

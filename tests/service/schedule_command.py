@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from sprag.service import client
-from sprag.service.cli.app import execute
+from sprag_study.service import client
+from sprag_study.service.cli.app import execute
 
 if TYPE_CHECKING:
     import pytest

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from sprag.worker import models
-from sprag.worker.models import ChunkResult
-from sprag.worker.rounds import Rounds
-from sprag.worker.study import Study
+from sprag_study.worker import models
+from sprag_study.worker.models import ChunkResult
+from sprag_study.worker.rounds import Rounds
+from sprag_study.worker.study import Study
 from tests.service.conftest import Service
 from tests.service.rounds import run_round
 from tests.service.timed_spec import SPEC

@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-import sprag.service.http.api.document  # noqa: F401 - closes the shapes: an answer has their fields and no others
+import sprag_study.service.http.api.document  # noqa: F401 - closes the shapes: an answer has their fields and no others
 
 
 def fits(shape: Any, answer: object) -> None:

@@ -9,9 +9,9 @@ from typing import Any
 import jsonschema
 import pytest
 
-from sprag.service.faults import Fault
-from sprag.service.spec.document import ParsedSpec, SpecError, parse_spec
-from sprag.service.spec.schema.document import spec_schema
+from sprag_study.service.faults import Fault
+from sprag_study.service.spec.document import ParsedSpec, SpecError, parse_spec
+from sprag_study.service.spec.schema.document import spec_schema
 
 #: The example of the spec's own documentation.
 SPEC: dict[str, Any] = {

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sprag.worker import models
-from sprag.worker.models import ChunkResult
+from sprag_study.worker import models
+from sprag_study.worker.models import ChunkResult
 from tests.service.spec_sample import changed
 
 if TYPE_CHECKING:
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
     from tests.service.conftest import Service
 
 FREQUENCIES = [16.0, 17.0, 18.0, 19.0, 20.0]

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 import pytest
 from pydantic import ValidationError
 
-from sprag.service.answers import catalogue, filled
+from sprag_study.service.answers import catalogue, filled
 from tests.service.shapes import fits
 
 

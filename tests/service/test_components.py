@@ -9,14 +9,14 @@ from typing import Any
 
 import pytest
 
-from sprag.service.client import Client
-from sprag.service.exports.components import components_csv
-from sprag.service.http.web.form.components import take_component
-from sprag.service.http.web.form.page import empty
-from sprag.service.http.web.form.spec import spec_of, values_of
-from sprag.service.spec.components import Component, fields_of, read_components
-from sprag.service.spec.document import parse_spec
-from sprag.service.spec.report import SpecError
+from sprag_study.service.client import Client
+from sprag_study.service.exports.components import components_csv
+from sprag_study.service.http.web.form.components import take_component
+from sprag_study.service.http.web.form.page import empty
+from sprag_study.service.http.web.form.spec import spec_of, values_of
+from sprag_study.service.spec.components import Component, fields_of, read_components
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.report import SpecError
 from tests.service.conftest import PortalTransport, Service
 from tests.service.spec_sample import SPEC
 
@@ -228,7 +228,7 @@ def test_commands_read_and_write_them(
 ) -> None:
     from functools import partial
 
-    from sprag.service import client as clients
+    from sprag_study.service import client as clients
 
     genuine = clients.Client
     monkeypatch.setattr(clients, "Client", partial(genuine, transport=PortalTransport(service.app, portal)))

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from sprag.service.faults import SelectionError
-from sprag.service.http.web.form.page import empty
-from sprag.service.http.web.form.spec import values_of
-from sprag.service.results.selection import value_of
+from sprag_study.service.faults import SelectionError
+from sprag_study.service.http.web.form.page import empty
+from sprag_study.service.http.web.form.spec import values_of
+from sprag_study.service.results.selection import value_of
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service

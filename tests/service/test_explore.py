@@ -18,9 +18,9 @@ import numpy as np
 import pytest
 from anyio.from_thread import BlockingPortal
 
-from sprag.service.cli import study_views
-from sprag.service.client import AsyncClient, Client, RefusedError
-from sprag.service.views.columns import Columns
+from sprag_study.service.cli import study_views
+from sprag_study.service.client import AsyncClient, Client, RefusedError
+from sprag_study.service.views.columns import Columns
 from tests.conftest import ROOT, Finished
 from tests.service.conftest import API, PortalTransport, Service
 

@@ -8,16 +8,16 @@ from typing import get_args
 
 import pytest
 
-from sprag.engine import Ending
-from sprag.engine.machine_shaft import problems
-from sprag.sentences import WarningText
-from sprag.service import faults
-from sprag.service.faults import Code, Fault, FaultError, Kind, ParameterFault, SelectionError, WarningCode
-from sprag.service.http.problems import PROBLEM_TYPES
-from sprag.service.spec.report import SpecError
-from sprag.service.storage import errors as storage
-from sprag.service.storage.stored_sentences import read_warnings, write_warnings
-from sprag.worker.ports import StoreError
+from sprag_study.engine import Ending
+from sprag_study.engine.machine_shaft import problems
+from sprag_study.sentences import WarningText
+from sprag_study.service import faults
+from sprag_study.service.faults import Code, Fault, FaultError, Kind, ParameterFault, SelectionError, WarningCode
+from sprag_study.service.http.problems import PROBLEM_TYPES
+from sprag_study.service.spec.report import SpecError
+from sprag_study.service.storage import errors as storage
+from sprag_study.service.storage.stored_sentences import read_warnings, write_warnings
+from sprag_study.worker.ports import StoreError
 from tests.conftest import ROOT
 
 PAGE = (ROOT / "docs" / "faults.md").read_text(encoding="utf-8")
@@ -57,7 +57,7 @@ def test_every_error_of_the_store_has_a_kind() -> None:
 
 
 def test_every_fault_of_a_machine_is_told_with_a_code() -> None:
-    from sprag.service.spec.machine.shaft_check import code_of
+    from sprag_study.service.spec.machine.shaft_check import code_of
 
     told = {code_of(kind.__new__(kind)) for kind in vars(problems).values() if isinstance(kind, type) and
             issubclass(kind, problems.MachineError)}  # fmt: skip

@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.service.reading.reader import Choice, Reading
-from sprag.service.results.defaults import usual_value
-from sprag.service.results.headlines.headline import KeyNumber, short_titles
-from sprag.service.spec.document import parse_spec
-from sprag.service.views.headline import Headline, headline_of, is_small
-from sprag.service.views.library import Library, reading_of
-from sprag.worker import models
-from sprag.worker.models import ChunkResult
-from sprag.worker.study import Study
+from sprag_study.service.reading.reader import Choice, Reading
+from sprag_study.service.results.defaults import usual_value
+from sprag_study.service.results.headlines.headline import KeyNumber, short_titles
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.views.headline import Headline, headline_of, is_small
+from sprag_study.service.views.library import Library, reading_of
+from sprag_study.worker import models
+from sprag_study.worker.models import ChunkResult
+from sprag_study.worker.study import Study
 from tests.service.calibrating import DAMPING, calibration
 from tests.service.conftest import Service
 from tests.service.rounds import run_round

@@ -17,10 +17,10 @@ import numpy as np
 import pytest
 from anyio.from_thread import BlockingPortal
 
-from sprag.service.cli import study_views
-from sprag.service.cli.console import cell_text
-from sprag.service.client import AsyncClient, Client
-from sprag.service.http.web.sheet import chart
+from sprag_study.service.cli import study_views
+from sprag_study.service.cli.console import cell_text
+from sprag_study.service.client import AsyncClient, Client
+from sprag_study.service.http.web.sheet import chart
 from tests.conftest import Finished
 from tests.service.conftest import API, PortalTransport, Service
 from tests.service.figures.seen import chart_of

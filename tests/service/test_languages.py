@@ -13,9 +13,9 @@ from babel.messages.pofile import read_po
 from babel.numbers import format_decimal
 
 from docs import catalogues
-from sprag.service import languages
-from sprag.service.languages.catalogue import CatalogueError, Entry, Key, read, written
-from sprag.service.reading.wording import number
+from sprag_study.service import languages
+from sprag_study.service.languages.catalogue import CatalogueError, Entry, Key, read, written
+from sprag_study.service.reading.wording import number
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

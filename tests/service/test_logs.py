@@ -15,14 +15,14 @@ import httpx
 import pytest
 from pydantic import SecretStr
 
-from sprag.service.http.app import create_app
-from sprag.service.http.request_log import REQUEST_HEADER
-from sprag.service.logs import JsonFormatter, TextFormatter, configure
-from sprag.worker.ports import StoreError
+from sprag_study.service.http.app import create_app
+from sprag_study.service.http.request_log import REQUEST_HEADER
+from sprag_study.service.logs import JsonFormatter, TextFormatter, configure
+from sprag_study.worker.ports import StoreError
 from tests.service.http.people import Office
 
 if TYPE_CHECKING:
-    from sprag.service.settings import Settings
+    from sprag_study.service.settings import Settings
     from tests.service.conftest import Service
 
 

@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from sprag.engine.machine_shaft.simulate import simulate
-from sprag.engine.machine_shaft.spec import MachineSpec
-from sprag.engine.machine_shaft.trajectory import trajectory
-from sprag.service.answers import results, studies
-from sprag.service.jobs.local import run_here
-from sprag.service.spec.document import format_of, load_spec, parse_spec
-from sprag.service.storage.store import Store
-from sprag.worker import models
-from sprag.worker.executors.inline import InlineExecutor
+from sprag_study.engine.machine_shaft.simulate import simulate
+from sprag_study.engine.machine_shaft.spec import MachineSpec
+from sprag_study.engine.machine_shaft.trajectory import trajectory
+from sprag_study.service.answers import results, studies
+from sprag_study.service.jobs.local import run_here
+from sprag_study.service.spec.document import format_of, load_spec, parse_spec
+from sprag_study.service.storage.store import Store
+from sprag_study.worker import models
+from sprag_study.worker.executors.inline import InlineExecutor
 from tests.service.rounds import computed
 from tests.service.shapes import fits
 from tests.service.spec.machine.test_shaft import PRESS, changed

@@ -16,11 +16,11 @@ import pandas as pd
 import pint
 import pytest
 
-import sprag
-from sprag.service.plain_data import plain
-from sprag.service.reading.units import parse_quantity
-from sprag.service.spec.report import SpecError
-from tests.sprag.test_library import SPEC
+import sprag_study as sprag
+from sprag_study.service.plain_data import plain
+from sprag_study.service.reading.units import parse_quantity
+from sprag_study.service.spec.report import SpecError
+from tests.sprag_study.test_library import SPEC
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -189,7 +189,7 @@ def test_every_body_of_the_client_takes_them(door: str) -> None:
 def test_a_client_needs_none_of_these_libraries() -> None:
     program = (
         "import sys; sys.modules.update(dict.fromkeys(('numpy', 'pandas', 'pint')))\n"
-        "from decimal import Decimal; from sprag.service.client.wire import plain_body\n"
+        "from decimal import Decimal; from sprag_study.service.client.wire import plain_body\n"
         "assert plain_body({'a': Decimal('0.5'), 'b': (1, 2)}) == {'a': 0.5, 'b': [1, 2]}\n"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)

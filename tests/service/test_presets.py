@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sprag.service.presets import ABOUT, preset_names, preset_text
-from sprag.service.spec.document import format_of, load_spec, parse_spec
-from sprag.worker import models
-from sprag.worker.study import Axis, Study
+from sprag_study.service.presets import ABOUT, preset_names, preset_text
+from sprag_study.service.spec.document import format_of, load_spec, parse_spec
+from sprag_study.worker import models
+from sprag_study.worker.study import Axis, Study
 
 MACHINES = [name for name in preset_names() if "machine-shaft" in preset_text(name)[1]]
 

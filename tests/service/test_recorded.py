@@ -6,12 +6,12 @@ from datetime import time
 
 import pytest
 
-from sprag.service import languages
-from sprag.service.languages import earlier, recorded
-from sprag.service.results.regimes import motion_sentence
-from sprag.service.schedules.times import Window
-from sprag.worker.opening import COMPILING
-from sprag.worker.order import Coverage
+from sprag_study.service import languages
+from sprag_study.service.languages import earlier, recorded
+from sprag_study.service.results.regimes import motion_sentence
+from sprag_study.service.schedules.times import Window
+from sprag_study.worker.opening import COMPILING
+from sprag_study.worker.order import Coverage
 
 
 def test_the_window_of_a_schedule() -> None:

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from sprag.service.results.fronts import designs_of
-from sprag.service.spec.design import design_spec
-from sprag.service.spec.document import SpecError, parse_spec
-from sprag.worker.rounds import Rounds
-from sprag.worker.spread import DRIVE
+from sprag_study.service.results.fronts import designs_of
+from sprag_study.service.spec.design import design_spec
+from sprag_study.service.spec.document import SpecError, parse_spec
+from sprag_study.worker.rounds import Rounds
+from sprag_study.worker.spread import DRIVE
 from tests.service.rounds import run_round
 from tests.service.searching import rows_of, spec_of
 from tests.service.spec_sample import schema

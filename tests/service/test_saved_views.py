@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from sprag.service.cli import saved_views as commands
-from sprag.service.client import Client
-from sprag.service.jobs.reports.curve import small_curve
-from sprag.service.report.blocks import Image, Text
-from sprag.service.report.document import document_of, report_of
-from sprag.service.spec.report import SpecError
-from sprag.service.spec.saved_views import read_view, read_view_change
-from sprag.service.views.library import Library
-from sprag.service.views.study_questions import ReportQuestion
+from sprag_study.service.cli import saved_views as commands
+from sprag_study.service.client import Client
+from sprag_study.service.jobs.reports.curve import small_curve
+from sprag_study.service.report.blocks import Image, Text
+from sprag_study.service.report.document import document_of, report_of
+from sprag_study.service.spec.report import SpecError
+from sprag_study.service.spec.saved_views import read_view, read_view_change
+from sprag_study.service.views.library import Library
+from sprag_study.service.views.study_questions import ReportQuestion
 from tests.service.conftest import PortalTransport, Service
 
 if TYPE_CHECKING:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import pytest
 from pydantic import ValidationError
 
-from sprag.service.cli.configured import read_settings
-from sprag.service.cli.console import WrongInputError
-from sprag.service.settings import Settings, available_cores, default_database_path, shown, table
+from sprag_study.service.cli.configured import read_settings
+from sprag_study.service.cli.console import WrongInputError
+from sprag_study.service.settings import Settings, available_cores, default_database_path, shown, table
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -141,7 +141,7 @@ def test_a_wrong_file_is_told(
 
 
 def test_the_names_of_time_zones_are_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    from sprag.service import zones
+    from sprag_study.service import zones
 
     reads: list[int] = []
 

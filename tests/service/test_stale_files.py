@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from sprag.service.cli.files import output
-from sprag.service.jobs.local import run_here
-from sprag.service.stale_files import YOUNG_SECONDS, mark, sweep
-from sprag.worker.executors.inline import InlineExecutor
+from sprag_study.service.cli.files import output
+from sprag_study.service.jobs.local import run_here
+from sprag_study.service.stale_files import YOUNG_SECONDS, mark, sweep
+from sprag_study.worker.executors.inline import InlineExecutor
 from tests.worker import fakes
 
 if TYPE_CHECKING:

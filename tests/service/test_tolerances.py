@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from sprag.service.client.frames import grid_of
-from sprag.service.presets import preset_text
-from sprag.service.results.selection import held_texts
-from sprag.service.spec.document import parse_spec
-from sprag.service.spec.text import load_spec
-from sprag.worker import models
-from sprag.worker.models import WorkerEnding
-from sprag.worker.spread import DRIVE, Spread, Tolerance
-from sprag.worker.study import Axis, Study
+from sprag_study.service.client.frames import grid_of
+from sprag_study.service.presets import preset_text
+from sprag_study.service.results.selection import held_texts
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.text import load_spec
+from sprag_study.worker import models
+from sprag_study.worker.models import WorkerEnding
+from sprag_study.worker.spread import DRIVE, Spread, Tolerance
+from sprag_study.worker.study import Axis, Study
 from tests.service.spec_sample import parsed
 
 if TYPE_CHECKING:

@@ -14,26 +14,26 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sprag.engine import Ending
-from sprag.engine.catalogue import Parameter, ResultInfo
-from sprag.engine.outcome import Trajectory
-from sprag.service.client import Client
-from sprag.service.formats import MEDIA_TYPES
-from sprag.service.http.web.form.fields import FORM_MODEL
-from sprag.service.http.web.form.machine import blocks
-from sprag.service.http.web.form.spec import spec_of, values_of
-from sprag.service.settings import Settings
-from sprag.service.spec.document import SpecError, parse_spec
-from sprag.service.spec.extend import parse_extended
-from sprag.service.spec.schema.document import spec_schema
-from sprag.service.storage.part import SystemClock
-from sprag.worker.dispatcher import Dispatcher
-from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, chunk_result
-from sprag.worker.models.model import Model
-from sprag.worker.models.presentation import Presentation
-from sprag.worker.models.registry import model_of
-from sprag.worker.study import Study
+from sprag_study.engine import Ending
+from sprag_study.engine.catalogue import Parameter, ResultInfo
+from sprag_study.engine.outcome import Trajectory
+from sprag_study.service.client import Client
+from sprag_study.service.formats import MEDIA_TYPES
+from sprag_study.service.http.web.form.fields import FORM_MODEL
+from sprag_study.service.http.web.form.machine import blocks
+from sprag_study.service.http.web.form.spec import spec_of, values_of
+from sprag_study.service.settings import Settings
+from sprag_study.service.spec.document import SpecError, parse_spec
+from sprag_study.service.spec.extend import parse_extended
+from sprag_study.service.spec.schema.document import spec_schema
+from sprag_study.service.storage.part import SystemClock
+from sprag_study.worker.dispatcher import Dispatcher
+from sprag_study.worker.executors.inline import InlineExecutor
+from sprag_study.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, chunk_result
+from sprag_study.worker.models.model import Model
+from sprag_study.worker.models.presentation import Presentation
+from sprag_study.worker.models.registry import model_of
+from sprag_study.worker.study import Study
 from tests.service.conftest import PortalTransport
 from tests.service.http.web.controls import Controls
 from tests.service.registered import create_table, registered

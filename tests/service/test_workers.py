@@ -11,13 +11,13 @@ import pytest
 import sqlalchemy as sa
 from prometheus_client.parser import text_string_to_metric_families
 
-from sprag.service.answers.workers import WorkerList
-from sprag.service.cli import workers
-from sprag.service.cli.app import execute
-from sprag.service.cli.doctor import examine
-from sprag.service.storage.tables import DISPATCHERS
-from sprag.worker import fingerprint
-from sprag.worker.reports import WorkerReport
+from sprag_study.service.answers.workers import WorkerList
+from sprag_study.service.cli import workers
+from sprag_study.service.cli.app import execute
+from sprag_study.service.cli.doctor import examine
+from sprag_study.service.storage.tables import DISPATCHERS
+from sprag_study.worker import fingerprint
+from sprag_study.worker.reports import WorkerReport
 from tests.service.conftest import SPEC
 from tests.service.shapes import fits
 from tests.worker import fakes
@@ -151,7 +151,7 @@ def test_the_service_is_not_ready_while_no_worker_can_work(service: Service) -> 
 
 def test_a_worker_that_hangs_is_a_fault_of_the_installation(service: Service, monkeypatch: pytest.MonkeyPatch) -> None:
     hung = {"owner": "head:7", "silent": True, "ended_at": None}
-    monkeypatch.setattr("sprag.service.jobs.workers.worker_list", lambda _store: {"dispatchers": [hung]})
+    monkeypatch.setattr("sprag_study.service.jobs.workers.worker_list", lambda _store: {"dispatchers": [hung]})
     doctor = {finding.subject: finding for finding in examine(str(service.store.session.path))}
     assert not doctor["workers"].ok
     assert doctor["workers"].detail.startswith("no heartbeat from head:7")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from sprag.service.http.api import examples
+from sprag_study.service.http.api import examples
 
 SPEC: Final[dict[str, Any]] = {
     **examples.SPEC,

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from sprag.service.http.api import examples
-from sprag.service.reading.units import parse_quantity
-from sprag.service.results.unaffected import unaffected
-from sprag.service.schedules.deadline import finish_warnings
-from sprag.service.spec.document import parse_spec
-from sprag.service.spec.measured import parse_measured
-from sprag.service.storage.rows import reuse
-from sprag.worker import models
-from sprag.worker.chunking import Chunking
+from sprag_study.service.http.api import examples
+from sprag_study.service.reading.units import parse_quantity
+from sprag_study.service.results.unaffected import unaffected
+from sprag_study.service.schedules.deadline import finish_warnings
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.measured import parse_measured
+from sprag_study.service.storage.rows import reuse
+from sprag_study.worker import models
+from sprag_study.worker.chunking import Chunking
 from tests.service import refined_study, swept_study
 from tests.service.results.test_sensitivity import fetching
 from tests.service.spec.kinds import test_goal

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from sprag.service.storage.part import SystemClock
-from sprag.service.storage.store import Store
-from sprag.service.storage.studies.records import StudyRecord
-from sprag.worker.dispatcher import (
+from sprag_study.service.storage.part import SystemClock
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.studies.records import StudyRecord
+from sprag_study.worker.dispatcher import (
     Dispatcher,
 )
-from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.models import ChunkResult, ChunkTask
-from sprag.worker.ports import Executor, Outcome
-from sprag.worker.states import StudyState
+from sprag_study.worker.executors.inline import InlineExecutor
+from sprag_study.worker.models import ChunkResult, ChunkTask
+from sprag_study.worker.ports import Executor, Outcome
+from sprag_study.worker.states import StudyState
 from tests.worker import fakes
 
 

@@ -17,16 +17,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker import models
-from sprag.worker.executors.process_pool import ProcessPoolExecutor
-from sprag.worker.models import ChunkResult, ChunkTask, KernelShape
-from sprag.worker.pool.child_process import uncounted
-from sprag.worker.reports import ExecutorReport, Reporter, WorkerReport
-from sprag.worker.study import Axis, Study
+from sprag_study.worker import models
+from sprag_study.worker.executors.process_pool import ProcessPoolExecutor
+from sprag_study.worker.models import ChunkResult, ChunkTask, KernelShape
+from sprag_study.worker.pool.child_process import uncounted
+from sprag_study.worker.reports import ExecutorReport, Reporter, WorkerReport
+from sprag_study.worker.study import Axis, Study
 
 if TYPE_CHECKING:
-    from sprag.service.storage.store import Store
-    from sprag.worker.ports import Clock
+    from sprag_study.service.storage.store import Store
+    from sprag_study.worker.ports import Clock
 
 BASE = {
     "excitation.frequency": 25.0,

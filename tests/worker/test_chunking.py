@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sprag.sentences import WarningText
-from sprag.worker.chunking import CHUNK_SECONDS, MAX_CHUNKS, MIN_CASES, Chunking, chunk_cases, spans, work_of
+from sprag_study.sentences import WarningText
+from sprag_study.worker.chunking import CHUNK_SECONDS, MAX_CHUNKS, MIN_CASES, Chunking, chunk_cases, spans, work_of
 from tests.worker import fakes
 
 

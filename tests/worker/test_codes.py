@@ -1,8 +1,8 @@
 """Numbers of endings, regimes and flags: files written long ago still mean the same."""
 
-from sprag.engine.vibration_drive.regimes import Regime
-from sprag.worker import models
-from sprag.worker.codes import ENDING_CODES, FLAG_MASKS, PENDING, REGIME_CODES
+from sprag_study.engine.vibration_drive.regimes import Regime
+from sprag_study.worker import models
+from sprag_study.worker.codes import ENDING_CODES, FLAG_MASKS, PENDING, REGIME_CODES
 
 #: What files that exist hold. Lines are added here, never changed or taken away.
 GIVEN = {

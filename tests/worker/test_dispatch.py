@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sprag.worker.dispatch import (
+from sprag_study.worker.dispatch import (
     Broken,
     Cancelled,
     Dispatch,
@@ -29,7 +29,7 @@ from sprag.worker.dispatch import (
     disjoint,
     pieces,
 )
-from sprag.worker.ports import Chunk, Fate
+from sprag_study.worker.ports import Chunk, Fate
 from tests.worker.world import World
 
 

@@ -8,23 +8,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sprag.service.actor import Actor, Door, Role, act_as
-from sprag.service.storage.part import SystemClock
-from sprag.service.storage.store import Store
-from sprag.service.storage.studies.records import StudyRecord
-from sprag.worker.chunking import Chunking
-from sprag.worker.dispatcher import (
+from sprag_study.service.actor import Actor, Door, Role, act_as
+from sprag_study.service.storage.part import SystemClock
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.studies.records import StudyRecord
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.dispatcher import (
     HEARTBEAT_SECONDS,
     POLL_SECONDS,
     QUIET_POLL_SECONDS,
     Dispatcher,
 )
-from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.models import ChunkResult, ChunkTask
-from sprag.worker.opening import OPEN_STUDIES
-from sprag.worker.ports import ActiveStudy, EpochLostError, Executor, Outcome
-from sprag.worker.reports import ExecutorReport
-from sprag.worker.states import StudyState
+from sprag_study.worker.executors.inline import InlineExecutor
+from sprag_study.worker.models import ChunkResult, ChunkTask
+from sprag_study.worker.opening import OPEN_STUDIES
+from sprag_study.worker.ports import ActiveStudy, EpochLostError, Executor, Outcome
+from sprag_study.worker.reports import ExecutorReport
+from sprag_study.worker.states import StudyState
 from tests.worker import fakes
 from tests.worker.dispatching import Prompt, after, endings, submit, work
 
@@ -409,7 +409,7 @@ def test_with_news_the_store_is_looked_at_when_it_has_changed_and_seldom_otherwi
 def test_the_log_names_a_study_by_its_id_whether_it_ran_or_not(store: Store, caplog: pytest.LogCaptureFixture) -> None:
     ran, cancelled = submit(store, 8), submit(store, 8)
     store.studies.cancel(cancelled.id)
-    with caplog.at_level("INFO", "sprag.worker.dispatcher"):
+    with caplog.at_level("INFO", "sprag.worker"):
         work(store, InlineExecutor(fakes.run))
     assert f"The study {cancelled.id} is cancelled." in caplog.text
     assert f"The study {ran.id} is finished." in caplog.text

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from sprag.engine.sources import source_hash
-from sprag.worker import fingerprint
+from sprag_study.engine.sources import source_hash
+from sprag_study.worker import fingerprint
 from tests.conftest import ROOT
 from tests.worker.fakes import of_any_processor
 
@@ -21,7 +21,7 @@ OWN = {"numpy": "2.1", "C library": "glibc 2.36", "numba settings": ""}
 
 def collected(**environment: str) -> str:
     """The digest of a process of its own."""
-    command = [sys.executable, "-c", "from sprag.worker import fingerprint; print(fingerprint.digest())"]
+    command = [sys.executable, "-c", "from sprag_study.worker import fingerprint; print(fingerprint.digest())"]
     return subprocess.run(
         command, cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT), **environment}, capture_output=True, text=True,
         check=True, timeout=600,

@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 
-from sprag.service.storage.store import Store
-from sprag.worker import dispatcher
-from sprag.worker.chunking import Chunking
-from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.ports import Chunk, Finished, Outcome
-from sprag.worker.states import StudyState
+from sprag_study.service.storage.store import Store
+from sprag_study.worker import dispatcher
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.executors.inline import InlineExecutor
+from sprag_study.worker.ports import Chunk, Finished, Outcome
+from sprag_study.worker.states import StudyState
 from tests.worker import fakes
 from tests.worker.dispatching import endings, submit, work
 

@@ -7,18 +7,18 @@ from functools import partialmethod
 
 import pytest
 
-from sprag.service.storage.store import Store
-from sprag.service.storage.work.work import Work
-from sprag.worker.chunking import Chunking
-from sprag.worker.dispatcher import (
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.work.work import Work
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.dispatcher import (
     POLL_SECONDS,
     Dispatcher,
 )
-from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.opening import COMPILING, NOTE_SECONDS
-from sprag.worker.ports import KernelError, Outcome, StoreFullError
-from sprag.worker.states import StudyState
-from sprag.worker.study import Study
+from sprag_study.worker.executors.inline import InlineExecutor
+from sprag_study.worker.opening import COMPILING, NOTE_SECONDS
+from sprag_study.worker.ports import KernelError, Outcome, StoreFullError
+from sprag_study.worker.states import StudyState
+from sprag_study.worker.study import Study
 from tests.worker import fakes
 from tests.worker.dispatching import Prompt, endings, submit, work
 

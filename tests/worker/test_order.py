@@ -8,8 +8,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sprag.worker.order import coverage, levels, levels_of, order_of
-from sprag.worker.study import Axis, Study
+from sprag_study.worker.order import coverage, levels, levels_of, order_of
+from sprag_study.worker.study import Axis, Study
 
 
 def study_of(*axes: list[float], combine: str = "grid") -> Study:

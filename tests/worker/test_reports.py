@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sprag.worker.reports import MAX_REFUSED, RATE_SECONDS, ExecutorReport, Reporter, WorkerReport
+from sprag_study.worker.reports import MAX_REFUSED, RATE_SECONDS, ExecutorReport, Reporter, WorkerReport
 
 
 def test_workers_are_summed_up_by_host() -> None:

@@ -8,11 +8,11 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sprag.worker import models
-from sprag.worker.case_keys import case_keys
-from sprag.worker.models.formulas import evaluate
-from sprag.worker.reuse import Wanted, kin_hash, shared_cases, span, taken
-from sprag.worker.study import Axis, Study
+from sprag_study.worker import models
+from sprag_study.worker.case_keys import case_keys
+from sprag_study.worker.models.formulas import evaluate
+from sprag_study.worker.reuse import Wanted, kin_hash, shared_cases, span, taken
+from sprag_study.worker.study import Axis, Study
 from tests.worker.fakes import BASE, RUN
 
 PATHS = ("shaft.load", "excitation.frequency", "excitation.amplitude_x", "excitation.amplitude_y")

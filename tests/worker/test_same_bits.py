@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from sprag import worker
+from sprag_study import worker
 from tests.engine.test_same_bits import calls
 
 #: What people are told of a calibration in the end; no case follows from it.

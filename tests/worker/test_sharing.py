@@ -6,9 +6,9 @@ from random import Random
 
 import pytest
 
-from sprag.worker.ports import ActiveStudy, Peer
-from sprag.worker.sharing import gives, takes
-from sprag.worker.states import StudyState
+from sprag_study.worker.ports import ActiveStudy, Peer
+from sprag_study.worker.sharing import gives, takes
+from sprag_study.worker.states import StudyState
 
 
 def study(number: int, *, priority: int = 0, fingerprint: str = "") -> ActiveStudy:

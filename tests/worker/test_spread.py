@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sprag.worker.case_keys import case_keys
-from sprag.worker.derived import distinct_values, involved
-from sprag.worker.order import order_of
-from sprag.worker.reuse import kin_hash, shared_cases, span, taken
-from sprag.worker.spread import DRIVE, Spread, Tolerance
-from sprag.worker.study import Axis, Combine, Study, without_drives
+from sprag_study.worker.case_keys import case_keys
+from sprag_study.worker.derived import distinct_values, involved
+from sprag_study.worker.order import order_of
+from sprag_study.worker.reuse import kin_hash, shared_cases, span, taken
+from sprag_study.worker.spread import DRIVE, Spread, Tolerance
+from sprag_study.worker.study import Axis, Combine, Study, without_drives
 
 BASE = {"a": 2.0, "b": 0.5, "c": 1.0, "d": 3.0, "load": 0.0}
 DRAWS = np.array([[1.1, 0.01, 7.0], [0.9, -0.02, 8.0], [1.05, 0.0, 7.0]])

@@ -2,7 +2,7 @@
 
 import pytest
 
-from sprag.worker.states import ALREADY, TERMINAL, TRANSITIONS, StudyEvent, StudyState, TransitionError, follow
+from sprag_study.worker.states import ALREADY, TERMINAL, TRANSITIONS, StudyEvent, StudyState, TransitionError, follow
 
 
 def test_ends_are_ends_unless_failed_cases_are_run_again() -> None:

@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sprag.worker.derived import distinct_values, involved
-from sprag.worker.limits import MAX_AXES, MAX_CASES
-from sprag.worker.study import Axis, Study
+from sprag_study.worker.derived import distinct_values, involved
+from sprag_study.worker.limits import MAX_AXES, MAX_CASES
+from sprag_study.worker.study import Axis, Study
 
 RUN = {
     "duration": [60.0, "periods"],
@@ -31,7 +31,7 @@ def study(*axes: Axis, combine: str = "grid", **changes: object) -> Study:
 
 
 def told_apart(items: list[float]) -> bool:
-    """Whether no two values are taken for one (`sprag.worker.study.SAME_VALUE`)."""
+    """Whether no two values are taken for one (`sprag_study.worker.study.SAME_VALUE`)."""
     return not any(math.isclose(a, b, rel_tol=2e-9) for a, b in itertools.pairwise(sorted(items)))
 
 

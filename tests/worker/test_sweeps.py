@@ -10,20 +10,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sprag.service.storage.part import SystemClock
-from sprag.service.storage.store import Store
-from sprag.worker import models
-from sprag.worker.chunking import Chunking
-from sprag.worker.dispatch import Dispatch, Ended, Offered, Quarantine, Run, Split, pieces
-from sprag.worker.dispatcher import Dispatcher
-from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.models import ChunkResult, ChunkTask
-from sprag.worker.order import order_of
-from sprag.worker.ports import Chunk, Fate
-from sprag.worker.reuse import kin_hash, shared_cases, taken
-from sprag.worker.states import StudyState
-from sprag.worker.study import Axis, Study
-from sprag.worker.sweeps import LineOrder, line_to, lines_of, whole_lines
+from sprag_study.service.storage.part import SystemClock
+from sprag_study.service.storage.store import Store
+from sprag_study.worker import models
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.dispatch import Dispatch, Ended, Offered, Quarantine, Run, Split, pieces
+from sprag_study.worker.dispatcher import Dispatcher
+from sprag_study.worker.executors.inline import InlineExecutor
+from sprag_study.worker.models import ChunkResult, ChunkTask
+from sprag_study.worker.order import order_of
+from sprag_study.worker.ports import Chunk, Fate
+from sprag_study.worker.reuse import kin_hash, shared_cases, taken
+from sprag_study.worker.states import StudyState
+from sprag_study.worker.study import Axis, Study
+from sprag_study.worker.sweeps import LineOrder, line_to, lines_of, whole_lines
 from tests.worker import fakes
 
 RUN = {

@@ -6,8 +6,8 @@ from collections.abc import Collection
 from dataclasses import replace
 from random import Random
 
-from sprag.worker.chunking import spans
-from sprag.worker.dispatch import (
+from sprag_study.worker.chunking import spans
+from sprag_study.worker.dispatch import (
     Commit,
     Dispatch,
     Ended,
@@ -24,7 +24,7 @@ from sprag.worker.dispatch import (
     Split,
     Stop,
 )
-from sprag.worker.ports import Chunk, Fate
+from sprag_study.worker.ports import Chunk, Fate
 
 #: More than any study here needs, even with every case run alone twice.
 MOST_ENDS = 5_000

@@ -22,24 +22,24 @@ from uuid import uuid4
 import dask
 from distributed.scheduler import KilledWorker
 
-from sprag.sentences import Sentence, joined
-from sprag.worker import fingerprint, models
-from sprag.worker.executors import dask_tasks as tasks
-from sprag.worker.executors.dask_jobs import Job, Waiting, Worker, outcome_of, refusals, report_of
-from sprag.worker.executors.dask_link import CONFIG, Link, own_cluster, value_of
-from sprag.worker.executors.process_pool import MAX_LOADS, useful_chunks
-from sprag.worker.limits import WALL_TIMES
-from sprag.worker.ports import Chunk, ExecutorError, Fate, KernelError, Outcome
+from sprag_study.sentences import Sentence, joined
+from sprag_study.worker import fingerprint, models
+from sprag_study.worker.executors import dask_tasks as tasks
+from sprag_study.worker.executors.dask_jobs import Job, Waiting, Worker, outcome_of, refusals, report_of
+from sprag_study.worker.executors.dask_link import CONFIG, Link, own_cluster, value_of
+from sprag_study.worker.executors.process_pool import MAX_LOADS, useful_chunks
+from sprag_study.worker.limits import WALL_TIMES
+from sprag_study.worker.ports import Chunk, ExecutorError, Fate, KernelError, Outcome
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from distributed import Future
 
-    from sprag.worker.reports import ExecutorReport
-    from sprag.worker.study import Study
+    from sprag_study.worker.reports import ExecutorReport
+    from sprag_study.worker.study import Study
 
-_LOG = logging.getLogger(__name__)
+_LOG = logging.getLogger("sprag.worker")
 
 #: Seconds between two polls of the workers that joined or left; between two attempts to reach a lost scheduler.
 LOOK_SECONDS: Final = 0.5

@@ -1,4 +1,4 @@
-"""The workers of `sprag.worker.executors.dask` and their current jobs."""
+"""The workers of `sprag_study.worker.executors.dask` and their current jobs."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from concurrent.futures import CancelledError
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
-from sprag.sentences import Sentence
-from sprag.worker import fingerprint
-from sprag.worker.executors.dask_tasks import OtherFingerprintError
-from sprag.worker.ports import Fate, Outcome
-from sprag.worker.reports import ExecutorReport, WorkerReport
+from sprag_study.sentences import Sentence
+from sprag_study.worker import fingerprint
+from sprag_study.worker.executors.dask_tasks import OtherFingerprintError
+from sprag_study.worker.ports import Fate, Outcome
+from sprag_study.worker.reports import ExecutorReport, WorkerReport
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from distributed import Future
 
-    from sprag.worker import models
-    from sprag.worker.executors.dask_link import Link
+    from sprag_study.worker import models
+    from sprag_study.worker.executors.dask_link import Link
 
-_LOG = logging.getLogger(__name__)
+_LOG = logging.getLogger("sprag.worker")
 
 
 @dataclass(eq=False, slots=True)

@@ -1,4 +1,4 @@
-"""The connection of `sprag.worker.executors.dask` to a scheduler, which may be lost and restored."""
+"""The connection of `sprag_study.worker.executors.dask` to a scheduler, which may be lost and restored."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from urllib.parse import urlsplit
 from distributed import Client, LocalCluster
 from distributed.client import AllExit
 
-from sprag.worker.executors.dask_tasks import blame_at_once, end_worker
+from sprag_study.worker.executors.dask_tasks import blame_at_once, end_worker
 
 if TYPE_CHECKING:
     from collections.abc import Callable

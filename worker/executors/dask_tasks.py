@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import dask
 from distributed import Security
 
-from sprag.worker import fingerprint, models
-from sprag.worker.executors.known_answers import answers_of
-from sprag.worker.limits import LOAD_SECONDS
-from sprag.worker.pool.processes import within_processor_time
-from sprag.worker.ports import ExecutorError
-from sprag.worker.reports import processor
+from sprag_study.worker import fingerprint, models
+from sprag_study.worker.executors.known_answers import answers_of
+from sprag_study.worker.limits import LOAD_SECONDS
+from sprag_study.worker.pool.processes import within_processor_time
+from sprag_study.worker.ports import ExecutorError
+from sprag_study.worker.reports import processor
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,7 +32,7 @@ _loaded: set[models.KernelShape] = set()
 
 #: Calls `introduce`, as an expression for ``eval``. A function would be imported as soon as its message arrives, so a
 #: worker that cannot import Sprag would exit and be restarted endlessly without reporting why.
-INTRODUCE: Final = "__import__('sprag.worker.executors.dask_tasks', fromlist=['']).introduce('{}')"
+INTRODUCE: Final = "__import__('sprag_study.worker.executors.dask_tasks', fromlist=['']).introduce('{}')"
 
 
 class OtherFingerprintError(Exception):

@@ -7,15 +7,15 @@ import time
 from collections import deque
 from typing import TYPE_CHECKING
 
-from sprag.worker import models
-from sprag.worker.executors import known_answers
-from sprag.worker.ports import Chunk, Fate, Outcome
-from sprag.worker.reports import ExecutorReport, WorkerReport, processor
+from sprag_study.worker import models
+from sprag_study.worker.executors import known_answers
+from sprag_study.worker.ports import Chunk, Fate, Outcome
+from sprag_study.worker.reports import ExecutorReport, WorkerReport, processor
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
 
 class InlineExecutor:

@@ -10,12 +10,12 @@ import hashlib
 from contextlib import suppress
 from typing import TYPE_CHECKING, Final
 
-from sprag.worker import fingerprint, models
+from sprag_study.worker import fingerprint, models
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from sprag.worker.models import ChunkResult, ChunkTask, KernelShape
+    from sprag_study.worker.models import ChunkResult, ChunkTask, KernelShape
 
 #: The answers of the kernels that have answered in this process.
 _ANSWERS: Final[dict[KernelShape, str]] = {}

@@ -9,23 +9,23 @@ from functools import partial
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
-from sprag.sentences import Sentence
-from sprag.worker import fingerprint, models
-from sprag.worker.executors import known_answers
-from sprag.worker.fingerprint import prepare_as
-from sprag.worker.limits import LOAD_SECONDS, WALL_TIMES
-from sprag.worker.pool.child_pool import ChildPool, JobStoppedError
-from sprag.worker.pool.child_process import ProcessDiedError, ProcessStartError
-from sprag.worker.pool.processes import single_threaded_children, within_processor_time
-from sprag.worker.ports import Chunk, ExecutorError, Fate, KernelError, Outcome
-from sprag.worker.reports import ExecutorReport, WorkerReport, processor
+from sprag_study.sentences import Sentence
+from sprag_study.worker import fingerprint, models
+from sprag_study.worker.executors import known_answers
+from sprag_study.worker.fingerprint import prepare_as
+from sprag_study.worker.limits import LOAD_SECONDS, WALL_TIMES
+from sprag_study.worker.pool.child_pool import ChildPool, JobStoppedError
+from sprag_study.worker.pool.child_process import ProcessDiedError, ProcessStartError
+from sprag_study.worker.pool.processes import single_threaded_children, within_processor_time
+from sprag_study.worker.ports import Chunk, ExecutorError, Fate, KernelError, Outcome
+from sprag_study.worker.reports import ExecutorReport, WorkerReport, processor
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from concurrent.futures import Future
 
-    from sprag.worker.pool.child_pool import Job
-    from sprag.worker.study import Study
+    from sprag_study.worker.pool.child_pool import Job
+    from sprag_study.worker.study import Study
 
 #: Chunks in flight beyond one per process, so that a finished process finds the next one waiting: at least so many,
 #: and that share of the processes, because more of them finish while the rows of others are being stored.

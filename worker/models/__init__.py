@@ -10,15 +10,15 @@ import platform
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from sprag.engine import ENGINE_VERSION, Ending, Run, Span
-from sprag.engine.catalogue import Parameter, ResultInfo
-from sprag.engine.formulas.expressions import ExpressionError
-from sprag.engine.machine_shaft.problems import AssemblyError, InsufficientInertiaError, TableError
-from sprag.engine.outcome import Basin, Engagement, Engagements, Portrait, Trajectory
-from sprag.engine.problems import MachineError
-from sprag.engine.run import MEANS_FROM_PERIODS
-from sprag.engine.sources import engine_folder, source_hash
-from sprag.engine.vibration_drive.clutch import (
+from sprag_study.engine import ENGINE_VERSION, Ending, Run, Span
+from sprag_study.engine.catalogue import Parameter, ResultInfo
+from sprag_study.engine.formulas.expressions import ExpressionError
+from sprag_study.engine.machine_shaft.problems import AssemblyError, InsufficientInertiaError, TableError
+from sprag_study.engine.outcome import Basin, Engagement, Engagements, Portrait, Trajectory
+from sprag_study.engine.problems import MachineError
+from sprag_study.engine.run import MEANS_FROM_PERIODS
+from sprag_study.engine.sources import engine_folder, source_hash
+from sprag_study.engine.vibration_drive.clutch import (
     ClutchFit,
     ClutchFitError,
     ClutchLaw,
@@ -27,16 +27,16 @@ from sprag.engine.vibration_drive.clutch import (
     check_law,
     fit_clutch,
 )
-from sprag.engine.vibration_drive.clutch import torque as clutch_torque
-from sprag.engine.vibration_drive.parameters import (
+from sprag_study.engine.vibration_drive.clutch import torque as clutch_torque
+from sprag_study.engine.vibration_drive.parameters import (
     CLUTCH_COEFFICIENT,
     CLUTCH_WINDUP_LIMIT,
     MAX_COEFFICIENTS,
     MAX_PENDULUMS,
     START_STATES,
 )
-from sprag.worker.models import machine_shaft, vibration_drive
-from sprag.worker.models.abilities import (
+from sprag_study.worker.models import machine_shaft, vibration_drive
+from sprag_study.worker.models.abilities import (
     has_clutches,
     has_strobes,
     run_basin,
@@ -44,7 +44,7 @@ from sprag.worker.models.abilities import (
     run_engagements,
     run_portrait,
 )
-from sprag.worker.models.common import (
+from sprag_study.worker.models.common import (
     NO_PARAMETERS,
     ChunkResult,
     ChunkTask,
@@ -53,13 +53,13 @@ from sprag.worker.models.common import (
     KernelShape,
     WorkerEnding,
 )
-from sprag.worker.models.model import Model
-from sprag.worker.models.presentation import Panel, Presentation, Reference
-from sprag.worker.models.registry import all_models, model_names, model_of, register, unregister
-from sprag.worker.models.shares import SHARE, Share, with_shares
-from sprag.worker.models.tasks import chunk_task, run_chunk, run_task
-from sprag.worker.models.usable import half_width, unsettled, usable, usable_each, with_half_widths
-from sprag.worker.models.vibration_drive import (
+from sprag_study.worker.models.model import Model
+from sprag_study.worker.models.presentation import Panel, Presentation, Reference
+from sprag_study.worker.models.registry import all_models, model_names, model_of, register, unregister
+from sprag_study.worker.models.shares import SHARE, Share, with_shares
+from sprag_study.worker.models.tasks import chunk_task, run_chunk, run_task
+from sprag_study.worker.models.usable import half_width, unsettled, usable, usable_each, with_half_widths
+from sprag_study.worker.models.vibration_drive import (
     NOT_SETTLED,
     WINDUP_OUT_OF_DATA,
     coefficients,
@@ -67,7 +67,7 @@ from sprag.worker.models.vibration_drive import (
     kernel_source,
     run_of,
 )
-from sprag.worker.models.vibration_drive.settled import (
+from sprag_study.worker.models.vibration_drive.settled import (
     JUMPED,
     REGIME_SENTENCES,
     SETTLED,
@@ -79,7 +79,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
 __all__ = [
     "CLUTCH_COEFFICIENT",
@@ -358,27 +358,27 @@ def warm_up(study: Study) -> None:
 
 def cache_folder() -> Path:
     """Folder of the compiled kernels; created if missing."""
-    from sprag.engine.compile.cache import cache_folder as engine_cache_folder
+    from sprag_study.engine.compile.cache import cache_folder as engine_cache_folder
 
     return engine_cache_folder()
 
 
 def compiler() -> str:
     """The way in which this process compiles kernels."""
-    from sprag.engine.compile.ways import WAY
+    from sprag_study.engine.compile.ways import WAY
 
     return WAY
 
 
 def discard_compiled() -> None:
     """Delete every compiled kernel of this engine from the cache on disk, because some may be damaged."""
-    from sprag.engine.compile.cache import discard
+    from sprag_study.engine.compile.cache import discard
 
     discard()
 
 
 def cache_is_wanted() -> bool:
     """Whether that folder is the configured one, not the substitute for an unwritable one."""
-    from sprag.engine.compile.cache import is_wanted
+    from sprag_study.engine.compile.cache import is_wanted
 
     return is_wanted(cache_folder())

@@ -7,20 +7,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, TypeVar
 
-from sprag.worker.models.registry import model_of
+from sprag_study.worker.models.registry import model_of
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from sprag.engine.machine_shaft.transient_course import Course, Transient
-    from sprag.engine.outcome import Basin, Engagements, Portrait
-    from sprag.worker.models.branches import Along, CaseBranch
-    from sprag.worker.models.common import KernelShape
-    from sprag.worker.models.model import Strobes, Transients
-    from sprag.worker.models.sections import CaseSections, Sampling
-    from sprag.worker.models.turns import CaseTurn
-    from sprag.worker.study import Study
+    from sprag_study.engine.machine_shaft.transient_course import Course, Transient
+    from sprag_study.engine.outcome import Basin, Engagements, Portrait
+    from sprag_study.worker.models.branches import Along, CaseBranch
+    from sprag_study.worker.models.common import KernelShape
+    from sprag_study.worker.models.model import Strobes, Transients
+    from sprag_study.worker.models.sections import CaseSections, Sampling
+    from sprag_study.worker.models.turns import CaseTurn
+    from sprag_study.worker.study import Study
 
     Floats = NDArray[np.float64]
 

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.engine.endings import ENDINGS
-from sprag.worker.directions import SWEEP
-from sprag.worker.spread import DRIVE
+from sprag_study.engine.endings import ENDINGS
+from sprag_study.worker.directions import SWEEP
+from sprag_study.worker.spread import DRIVE
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
 
 #: Paths of axes that are not parameters of a machine.

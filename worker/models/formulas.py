@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.engine.formulas.expressions import CONSTANTS, MAX_LENGTH, RESERVED, Expression, ExpressionError, Node
+from sprag_study.engine.formulas.expressions import CONSTANTS, MAX_LENGTH, RESERVED, Expression, ExpressionError, Node
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

@@ -6,22 +6,22 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from sprag.worker.models.presentation import Presentation
+from sprag_study.worker.models.presentation import Presentation
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
-    from sprag.engine import Ending
-    from sprag.engine.catalogue import Parameter, ResultInfo
-    from sprag.engine.machine_shaft.transient_course import Course, Transient
-    from sprag.engine.outcome import Basin, Engagements, Portrait, Trajectory
-    from sprag.worker.models.branches import Along, CaseBranch
-    from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
-    from sprag.worker.models.sections import CaseSections, Sampling
-    from sprag.worker.models.turns import CaseTurn
-    from sprag.worker.study import Study
+    from sprag_study.engine import Ending
+    from sprag_study.engine.catalogue import Parameter, ResultInfo
+    from sprag_study.engine.machine_shaft.transient_course import Course, Transient
+    from sprag_study.engine.outcome import Basin, Engagements, Portrait, Trajectory
+    from sprag_study.worker.models.branches import Along, CaseBranch
+    from sprag_study.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
+    from sprag_study.worker.models.sections import CaseSections, Sampling
+    from sprag_study.worker.models.turns import CaseTurn
+    from sprag_study.worker.study import Study
 
     Floats = NDArray[np.float64]
 

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.worker.models.common import case_machine
-from sprag.worker.models.formulas import evaluate
-from sprag.worker.models.registry import model_of
+from sprag_study.worker.models.common import case_machine
+from sprag_study.worker.models.formulas import evaluate
+from sprag_study.worker.models.registry import model_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from numpy.typing import ArrayLike, NDArray
 
-    from sprag.engine.catalogue import Parameter
-    from sprag.worker.study import Study
+    from sprag_study.engine.catalogue import Parameter
+    from sprag_study.worker.study import Study
 
 _INDEX: Final = re.compile(r"\.(\d+)(?=\.|$)")
 

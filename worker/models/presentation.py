@@ -6,14 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
-from sprag.worker.models.form import Form
-from sprag.worker.models.laboratory import Laboratory
+from sprag_study.worker.models.form import Form
+from sprag_study.worker.models.laboratory import Laboratory
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from sprag.engine.outcome import Trajectory
+    from sprag_study.engine.outcome import Trajectory
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from sprag.worker.models.model import Model
+    from sprag_study.worker.models.model import Model
 
 _MODELS: dict[str, Model] = {}
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
-from sprag.worker.models.parameters import general_path
+from sprag_study.worker.models.parameters import general_path
 
 if TYPE_CHECKING:
-    from sprag.engine.catalogue import ResultInfo
+    from sprag_study.engine.catalogue import ResultInfo
 
 
 class Share(str):

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sprag.worker.models.common import NO_PARAMETERS, ChunkResult, ChunkTask, WorkerEnding, run_accepted
-from sprag.worker.models.parameters import refused_cases
-from sprag.worker.models.registry import model_of
-from sprag.worker.sweeps import lines_of
+from sprag_study.worker.models.common import NO_PARAMETERS, ChunkResult, ChunkTask, WorkerEnding, run_accepted
+from sprag_study.worker.models.parameters import refused_cases
+from sprag_study.worker.models.registry import model_of
+from sprag_study.worker.sweeps import lines_of
 
 if TYPE_CHECKING:
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
 
 def chunk_task(study: Study, first: int, count: int) -> ChunkTask:
@@ -37,7 +37,7 @@ def run_task(task: ChunkTask) -> ChunkResult:
 
     A physical failure is an ending in the result, never an exception; an exception is a bug.
     """
-    from sprag.engine.faults import inject
+    from sprag_study.engine.faults import inject
 
     inject(task.columns, task.count)
     model = model_of(task.shape.model)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from sprag.engine.outcome import Trajectory
+    from sprag_study.engine.outcome import Trajectory
 
 
 @dataclass(frozen=True, slots=True)

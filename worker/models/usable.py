@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from sprag.engine import Ending
-from sprag.worker.models.registry import model_of
+from sprag_study.engine import Ending
+from sprag_study.worker.models.registry import model_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

@@ -7,10 +7,10 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Final
 
-from sprag.worker.directions import SWEEP
-from sprag.worker.models.parameters import general_path, model_parameter
-from sprag.worker.models.registry import model_of
-from sprag.worker.spread import DRIVE
+from sprag_study.worker.directions import SWEEP
+from sprag_study.worker.models.parameters import general_path, model_parameter
+from sprag_study.worker.models.registry import model_of
+from sprag_study.worker.spread import DRIVE
 
 _HALF_WIDTH: Final = ".half_width"
 #: Caption of the half width of a mean.

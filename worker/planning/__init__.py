@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from sprag.worker.planning.calibrate.plan import CALIBRATE, CalibratePlan
-from sprag.worker.planning.calibrate.planner import CalibratePlanner
-from sprag.worker.planning.goals.plan import GOAL, GoalPlan
-from sprag.worker.planning.goals.planner import GoalPlanner
-from sprag.worker.planning.refine import refiner
-from sprag.worker.planning.refine_plan import REFINE, RefinePlan
+from sprag_study.worker.planning.calibrate.plan import CALIBRATE, CalibratePlan
+from sprag_study.worker.planning.calibrate.planner import CalibratePlanner
+from sprag_study.worker.planning.goals.plan import GOAL, GoalPlan
+from sprag_study.worker.planning.goals.planner import GoalPlanner
+from sprag_study.worker.planning.refine import refiner
+from sprag_study.worker.planning.refine_plan import REFINE, RefinePlan
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from sprag.worker.planning.rounds import Planner
-    from sprag.worker.study import Study
+    from sprag_study.worker.planning.rounds import Planner
+    from sprag_study.worker.study import Study
 
 
 def _refiner(plan: Mapping[str, Any]) -> Planner:

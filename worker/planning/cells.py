@@ -15,7 +15,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.worker.planning.samples import Samples
+    from sprag_study.worker.planning.samples import Samples
 
     Bools = NDArray[np.bool_]
     Floats = NDArray[np.float64]

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.worker.planning.transients import ROUGH, roughness, sensitive, weak
+from sprag_study.worker.planning.transients import ROUGH, roughness, sensitive, weak
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.worker.planning.samples import Samples
+    from sprag_study.worker.planning.samples import Samples
 
     Bools = NDArray[np.bool_]
     Floats = NDArray[np.float64]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag.worker.planning.refined_curves import Curve, CurveRefiner, Jump, describe
-from sprag.worker.planning.refined_maps import Map, MapRefiner, describe_maps
-from sprag.worker.planning.refiner import largest
+from sprag_study.worker.planning.refined_curves import Curve, CurveRefiner, Jump, describe
+from sprag_study.worker.planning.refined_maps import Map, MapRefiner, describe_maps
+from sprag_study.worker.planning.refiner import largest
 
 if TYPE_CHECKING:
-    from sprag.worker.planning.refine_plan import RefinePlan
-    from sprag.worker.planning.refiner import Refiner
+    from sprag_study.worker.planning.refine_plan import RefinePlan
+    from sprag_study.worker.planning.refiner import Refiner
 
 __all__ = ["Curve", "CurveRefiner", "Jump", "Map", "MapRefiner", "describe", "describe_maps", "largest", "refiner"]
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.sentences import Sentence
-from sprag.worker.errors import WrongPlanError
-from sprag.worker.models.usable import half_width
+from sprag_study.sentences import Sentence
+from sprag_study.worker.errors import WrongPlanError
+from sprag_study.worker.models.usable import half_width
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

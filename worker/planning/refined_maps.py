@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.worker.planning.cells import Cells, Tree, tree
-from sprag.worker.planning.refiner import Described, Refiner
-from sprag.worker.planning.samples import Samples
+from sprag_study.worker.planning.cells import Cells, Tree, tree
+from sprag_study.worker.planning.refiner import Described, Refiner
+from sprag_study.worker.planning.samples import Samples
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.worker.planning.refine_plan import RefinePlan
-    from sprag.worker.planning.refiner import Places
-    from sprag.worker.planning.rounds import Rows
+    from sprag_study.worker.planning.refine_plan import RefinePlan
+    from sprag_study.worker.planning.refiner import Places
+    from sprag_study.worker.planning.rounds import Rows
 
     Bools = NDArray[np.bool_]
     Floats = NDArray[np.float64]

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sprag.worker.order import levels
-from sprag.worker.planning.refine_plan import REFINE
-from sprag.worker.planning.rounds import Rows, Step
-from sprag.worker.planning.samples import Samples
+from sprag_study.worker.order import levels
+from sprag_study.worker.planning.refine_plan import REFINE
+from sprag_study.worker.planning.rounds import Rows, Step
+from sprag_study.worker.planning.samples import Samples
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
-    from sprag.worker.planning.refine_plan import RefinePlan
+    from sprag_study.worker.planning.refine_plan import RefinePlan
 
     Ints = NDArray[np.int64]
     #: Combination, and positions along each adaptive axis.
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class Refiner(ABC):
-    """A planner of refinement (`sprag.worker.planning.rounds.Planner`).
+    """A planner of refinement (`sprag_study.worker.planning.rounds.Planner`).
 
     Raises
     ------

@@ -26,7 +26,7 @@ class Rows:
     points : float64 array, shape (cases, columns)
         The parameters that vary, SI, as the planner asked for them.
     ok : bool array, shape (cases,)
-        `sprag.worker.models.usable`: False where the case has no results, or its motion had not settled.
+        `sprag_study.worker.models.usable`: False where the case has no results, or its motion had not settled.
     values : dict of float64 arrays, each shape (cases,)
         The planner's `results` and their half widths, SI, or the code of a category; NaN where there is no value.
     """

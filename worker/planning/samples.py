@@ -6,18 +6,18 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.worker.models.usable import half_width
-from sprag.worker.models.vibration_drive.settled import IRREGULAR
-from sprag.worker.planning.goals.draws import logarithm
-from sprag.worker.planning.refine_plan import MULTIPLIER, ORDER, REGIME, SETTLED_AFTER
+from sprag_study.worker.models.usable import half_width
+from sprag_study.worker.models.vibration_drive.settled import IRREGULAR
+from sprag_study.worker.planning.goals.draws import logarithm
+from sprag_study.worker.planning.refine_plan import MULTIPLIER, ORDER, REGIME, SETTLED_AFTER
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from sprag.worker.planning.refine_plan import RefinePlan
-    from sprag.worker.planning.rounds import Rows
+    from sprag_study.worker.planning.refine_plan import RefinePlan
+    from sprag_study.worker.planning.rounds import Rows
 
     Bools = NDArray[np.bool_]
     Floats = NDArray[np.float64]

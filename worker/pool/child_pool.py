@@ -8,7 +8,7 @@ from contextlib import suppress
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Generic, TypeVar, TypeVarTuple
 
-from sprag.worker.pool.child_process import ChildProcess, ProcessDiedError, ProcessStartError
+from sprag_study.worker.pool.child_process import ChildProcess, ProcessDiedError, ProcessStartError
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -17,7 +17,7 @@ from multiprocessing import get_context
 from multiprocessing.connection import wait
 from typing import TYPE_CHECKING, Any
 
-from sprag.worker.pool.processes import interrupts_held_back, start_pool_process
+from sprag_study.worker.pool.processes import interrupts_held_back, start_pool_process
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator

@@ -5,26 +5,33 @@ from __future__ import annotations
 from collections.abc import AsyncIterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
-from sprag.service.client.asynchronous.comparing import compare
-from sprag.service.client.asynchronous.connection import AsyncConnection
-from sprag.service.client.asynchronous.naming import schedule_of, study_of
-from sprag.service.client.asynchronous.study import AsyncStudy
-from sprag.service.client.queries import finish_text, query_of, spec_of
-from sprag.service.client.wire import component_path, model_path, preset_path, schedule_path, study_path, view_path
+from sprag_study.service.client.asynchronous.comparing import compare
+from sprag_study.service.client.asynchronous.connection import AsyncConnection
+from sprag_study.service.client.asynchronous.naming import schedule_of, study_of
+from sprag_study.service.client.asynchronous.study import AsyncStudy
+from sprag_study.service.client.queries import finish_text, query_of, spec_of
+from sprag_study.service.client.wire import (
+    component_path,
+    model_path,
+    preset_path,
+    schedule_path,
+    study_path,
+    view_path,
+)
 
 if TYPE_CHECKING:
     from datetime import datetime
     from os import PathLike
 
-    from sprag.service.answers.catalogue import Health, Model, Preset
-    from sprag.service.answers.components import ComponentEntry
-    from sprag.service.answers.people import AuditEntry, Me, User
-    from sprag.service.answers.saved_views import SavedViewEntry
-    from sprag.service.answers.schedules import Night, ScheduleDetail, ScheduleSummary
-    from sprag.service.answers.studies import ClutchFitReport, Preview, StudySummary
-    from sprag.service.answers.workers import WorkerList
-    from sprag.service.client.comparison import Comparison
-    from sprag.service.client.queries import Held, Spec, Value
+    from sprag_study.service.answers.catalogue import Health, Model, Preset
+    from sprag_study.service.answers.components import ComponentEntry
+    from sprag_study.service.answers.people import AuditEntry, Me, User
+    from sprag_study.service.answers.saved_views import SavedViewEntry
+    from sprag_study.service.answers.schedules import Night, ScheduleDetail, ScheduleSummary
+    from sprag_study.service.answers.studies import ClutchFitReport, Preview, StudySummary
+    from sprag_study.service.answers.workers import WorkerList
+    from sprag_study.service.client.comparison import Comparison
+    from sprag_study.service.client.queries import Held, Spec, Value
 
 
 class AsyncClient(AsyncConnection):

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from sprag.service.answers.differing import MOST_COMPARED, common_axes
-from sprag.service.client.comparison import Comparison, compared, held_in
+from sprag_study.service.answers.differing import MOST_COMPARED, common_axes
+from sprag_study.service.client.comparison import Comparison, compared, held_in
 
 if TYPE_CHECKING:
-    from sprag.service.client.asynchronous.study import AsyncStudy
-    from sprag.service.client.queries import Held
+    from sprag_study.service.client.asynchronous.study import AsyncStudy
+    from sprag_study.service.client.queries import Held
 
 
 async def compare(

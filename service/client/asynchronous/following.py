@@ -7,14 +7,14 @@ from collections.abc import AsyncGenerator
 from contextlib import aclosing, suppress
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.client.asynchronous.connection import AsyncConnection
-from sprag.service.client.errors import RefusedError, ServiceError, UnreachableError
-from sprag.service.client.retries import Retries
-from sprag.service.client.wire import study_path, within
+from sprag_study.service.client.asynchronous.connection import AsyncConnection
+from sprag_study.service.client.errors import RefusedError, ServiceError, UnreachableError
+from sprag_study.service.client.retries import Retries
+from sprag_study.service.client.wire import study_path, within
 
 if TYPE_CHECKING:
-    from sprag.service.client.events import StudyEvent
-    from sprag.service.client.waiting import Waiting
+    from sprag_study.service.client.events import StudyEvent
+    from sprag_study.service.client.waiting import Waiting
 
 _END: Final = "end"
 

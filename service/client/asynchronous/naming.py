@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.client.matching import Named, meant
-from sprag.service.client.wire import named
-from sprag.worker.limits import MAX_SEARCH_LENGTH
+from sprag_study.service.client.matching import Named, meant
+from sprag_study.service.client.wire import named
+from sprag_study.worker.limits import MAX_SEARCH_LENGTH
 
 if TYPE_CHECKING:
-    from sprag.service.client.asynchronous.connection import AsyncConnection
+    from sprag_study.service.client.asynchronous.connection import AsyncConnection
 
 LATEST: Final = "latest"
 _WHOLE_ID: Final = re.compile(r"(st|sc)_[0-9a-f]{16,}")

@@ -7,12 +7,12 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from sprag.service.client.asynchronous.part import AsyncStudyPart
-from sprag.service.client.frames import beside, grid_of, polars_of, table_of
-from sprag.service.client.queries import form_of, query_of
-from sprag.service.client.sketch import Picture
-from sprag.service.client.wire import case_path, whole_file
-from sprag.worker.codes import ENDING_CODES, PENDING
+from sprag_study.service.client.asynchronous.part import AsyncStudyPart
+from sprag_study.service.client.frames import beside, grid_of, polars_of, table_of
+from sprag_study.service.client.queries import form_of, query_of
+from sprag_study.service.client.sketch import Picture
+from sprag_study.service.client.wire import case_path, whole_file
+from sprag_study.worker.codes import ENDING_CODES, PENDING
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     import polars as pl
     import xarray as xr
 
-    from sprag.service.answers.results import Case, CaseDetail, RegimeRow
-    from sprag.service.client.queries import Held, Value
-    from sprag.service.formats import Header
+    from sprag_study.service.answers.results import Case, CaseDetail, RegimeRow
+    from sprag_study.service.client.queries import Held, Value
+    from sprag_study.service.formats import Header
 
 
 class AsyncStudyTables(AsyncStudyPart):
@@ -108,7 +108,7 @@ class AsyncStudyTables(AsyncStudyPart):
         language: str | None = None,
         point: Value | None = None,
     ) -> bytes:
-        """All rows in a format of `sprag.service.exports`, or the report as "html" or "pdf".
+        """All rows in a format of `sprag_study.service.exports`, or the report as "html" or "pdf".
 
         ``header`` of CSV: "names", with units that are not SI, or "units", with every unit. ``language`` of a report:
         a code such as "uk"; English without it. ``point`` of a report: its working point, such as "0.3 N*m".

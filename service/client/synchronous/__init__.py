@@ -1,1 +1,1 @@
-"""Made from `sprag.service.client.asynchronous` by ``python -m tests.service.client.generate``: change it there."""
+"""Made from `sprag_study.service.client.asynchronous` by ``python -m tests.service.client.generate``."""

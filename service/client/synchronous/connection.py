@@ -11,10 +11,10 @@ from typing import Any
 
 import httpx
 
-from sprag.service.client.errors import UnreachableError
-from sprag.service.client.events import EventReader, StudyEvent
-from sprag.service.client.retries import RETRY_SECONDS, Retries
-from sprag.service.client.wire import (
+from sprag_study.service.client.errors import UnreachableError
+from sprag_study.service.client.events import EventReader, StudyEvent
+from sprag_study.service.client.retries import RETRY_SECONDS, Retries
+from sprag_study.service.client.wire import (
     DEFAULT_SERVER,
     EVENTS_TIMEOUT,
     FILE_TIMEOUT,

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.client.wire import case_path, study_path
+from sprag_study.service.client.wire import case_path, study_path
 
 if TYPE_CHECKING:
-    from sprag.service.client.synchronous.connection import Connection
-    from sprag.service.client.wire import Query
+    from sprag_study.service.client.synchronous.connection import Connection
+    from sprag_study.service.client.wire import Query
 
 
 class StudyPart:

@@ -6,20 +6,20 @@ from collections.abc import Generator, Mapping, Sequence
 from contextlib import closing
 from typing import TYPE_CHECKING, Any, cast
 
-from sprag.service.client.bars import reporting
-from sprag.service.client.queries import extension, query_of
-from sprag.service.client.shown import Shown
-from sprag.service.client.synchronous.following import events_of, wait_for
-from sprag.service.client.synchronous.tables import StudyTables
-from sprag.service.client.synchronous.views import StudyViews
-from sprag.service.client.waiting import Waiting
+from sprag_study.service.client.bars import reporting
+from sprag_study.service.client.queries import extension, query_of
+from sprag_study.service.client.shown import Shown
+from sprag_study.service.client.synchronous.following import events_of, wait_for
+from sprag_study.service.client.synchronous.tables import StudyTables
+from sprag_study.service.client.synchronous.views import StudyViews
+from sprag_study.service.client.waiting import Waiting
 
 if TYPE_CHECKING:
-    from sprag.service.answers.studies import Round, StudyDetail, StudySummary
-    from sprag.service.client.bars import Progressing
-    from sprag.service.client.events import StudyEvent
-    from sprag.service.client.queries import Value
-    from sprag.service.client.wire import Query
+    from sprag_study.service.answers.studies import Round, StudyDetail, StudySummary
+    from sprag_study.service.client.bars import Progressing
+    from sprag_study.service.client.events import StudyEvent
+    from sprag_study.service.client.queries import Value
+    from sprag_study.service.client.wire import Query
 
 
 class Study(StudyViews, StudyTables, Shown):
@@ -40,7 +40,7 @@ class Study(StudyViews, StudyTables, Shown):
         """Wait until the study has ended or reached its deadline; returns the study itself.
 
         While the service does not answer, for instance during a restart, waiting continues with a warning in the log
-        (``sprag.service.client.waiting``).
+        (``sprag_study.service.client.waiting``).
 
         Parameters
         ----------

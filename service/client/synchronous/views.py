@@ -8,21 +8,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, cast
 
-from sprag.service.client.batches import Ribbon, Yield
-from sprag.service.client.frames import Curves
-from sprag.service.client.motions import Engagements, Motion
-from sprag.service.client.queries import query_of
-from sprag.service.client.synchronous.part import StudyPart
+from sprag_study.service.client.batches import Ribbon, Yield
+from sprag_study.service.client.frames import Curves
+from sprag_study.service.client.motions import Engagements, Motion
+from sprag_study.service.client.queries import query_of
+from sprag_study.service.client.synchronous.part import StudyPart
 
 if TYPE_CHECKING:
-    from sprag.service.answers.calibration import CalibrationReport
-    from sprag.service.answers.explore import Exploration
-    from sprag.service.answers.goals import FrontReport
-    from sprag.service.answers.key import AnswerReport
-    from sprag.service.answers.results import BasinData, Branch, Map, Portrait, SensitivityReport
-    from sprag.service.answers.sections import Sections
-    from sprag.service.answers.transients import Transient
-    from sprag.service.client.queries import Ends, Held, Value
+    from sprag_study.service.answers.calibration import CalibrationReport
+    from sprag_study.service.answers.explore import Exploration
+    from sprag_study.service.answers.goals import FrontReport
+    from sprag_study.service.answers.key import AnswerReport
+    from sprag_study.service.answers.results import BasinData, Branch, Map, Portrait, SensitivityReport
+    from sprag_study.service.answers.sections import Sections
+    from sprag_study.service.answers.transients import Transient
+    from sprag_study.service.client.queries import Ends, Held, Value
 
 
 class StudyViews(StudyPart):

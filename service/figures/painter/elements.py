@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.figures.figure import NEUTRAL, PALETTE
+from sprag_study.service.figures.figure import NEUTRAL, PALETTE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

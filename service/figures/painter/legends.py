@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from sprag.service.figures.figure import BANDS, NEUTRAL, NOTES, shortened
-from sprag.service.figures.orders import motion_text
-from sprag.service.figures.painter.elements import (
+from sprag_study.service.figures.figure import BANDS, NEUTRAL, NOTES, shortened
+from sprag_study.service.figures.orders import motion_text
+from sprag_study.service.figures.painter.elements import (
     LINE,
     SMALL,
     colour_of,
@@ -17,13 +17,13 @@ from sprag.service.figures.painter.elements import (
     text_at,
     text_width,
 )  # fmt: skip
-from sprag.service.reading.reader import shown
-from sprag.service.results.regimes import MARKS
+from sprag_study.service.reading.reader import shown
+from sprag_study.service.results.regimes import MARKS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    from sprag.service.figures.figure import Figure, Fill, Line, NoteKind
+    from sprag_study.service.figures.figure import Figure, Fill, Line, NoteKind
 
 DASHES: Final = (None, "7 4", "2 3", "8 3 2 3")
 NOTE_MARKERS: Final[dict[NoteKind, str]] = {"largest": "triangle-down", "smallest": "triangle-up", "point": "circle"}

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from sprag.service.figures.painter.elements import SMALL, text_width
+from sprag_study.service.figures.painter.elements import SMALL, text_width
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.service.figures.figure import shade
-from sprag.service.figures.orders import motion_text
-from sprag.service.figures.painter.elements import (
+from sprag_study.service.figures.figure import shade
+from sprag_study.service.figures.orders import motion_text
+from sprag_study.service.figures.painter.elements import (
     SMALL,
     colour_of,
     dots,
@@ -22,20 +22,20 @@ from sprag.service.figures.painter.elements import (
     text_at,
     text_width,
 )  # fmt: skip
-from sprag.service.figures.painter.legends import DASHES, NOTE_MARKERS
-from sprag.service.figures.painter.names import Box, Named, named_curves
-from sprag.service.figures.painter.scales import Scale, tick_text
-from sprag.service.figures.painter.thinning import thin
-from sprag.service.languages import gettext
-from sprag.service.reading.wording import number, unit_text
-from sprag.service.results.regimes import MARKS
+from sprag_study.service.figures.painter.legends import DASHES, NOTE_MARKERS
+from sprag_study.service.figures.painter.names import Box, Named, named_curves
+from sprag_study.service.figures.painter.scales import Scale, tick_text
+from sprag_study.service.figures.painter.thinning import thin
+from sprag_study.service.languages import gettext
+from sprag_study.service.reading.wording import number, unit_text
+from sprag_study.service.results.regimes import MARKS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from sprag.service.figures.figure import Figure, Line, Panel, Quantity
+    from sprag_study.service.figures.figure import Figure, Line, Panel, Quantity
 
     Numbers = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from sprag.service.figures.painter.elements import element
+from sprag_study.service.figures.painter.elements import element
 
 #: Pixels after which a pattern repeats, and the colour of its lines.
 _EVERY: Final = 6

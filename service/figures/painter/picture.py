@@ -7,15 +7,15 @@ from html import escape
 from typing import TYPE_CHECKING, Any, Final
 from zlib import crc32
 
-from sprag.service.figures.painter.elements import LINE, SIZE, SMALL, element, lines_of, moved, short, text_at
-from sprag.service.reading.wording import unit_text
+from sprag_study.service.figures.painter.elements import LINE, SIZE, SMALL, element, lines_of, moved, short, text_at
+from sprag_study.service.reading.wording import unit_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.figures.figure import Direction, Quantity
-    from sprag.service.figures.painter.legends import Rows
-    from sprag.service.figures.painter.scales import Scale
+    from sprag_study.service.figures.figure import Direction, Quantity
+    from sprag_study.service.figures.painter.legends import Rows
+    from sprag_study.service.figures.painter.scales import Scale
 
 #: Names of patterns, in attributes only: texts have no quotation marks.
 _NAMED: Final = re.compile(r'(?<=id=")~|(?<="url\(#)~')

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.figures.painter.elements import SMALL, text_width
-from sprag.service.reading.wording import number
+from sprag_study.service.figures.painter.elements import SMALL, text_width
+from sprag_study.service.reading.wording import number
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -24,7 +24,7 @@ FILE: Final = "answer_examples.json"
 @cache
 def recorded() -> dict[str, dict[str, Any]]:
     """Every recorded answer; `tests/service/http/api/test_answer_examples.py` records them."""
-    text = files("sprag.service.http.api").joinpath(FILE).read_text(encoding="utf-8")
+    text = files("sprag_study.service.http.api").joinpath(FILE).read_text(encoding="utf-8")
     answers: dict[str, dict[str, Any]] = json.loads(text)
     return answers
 

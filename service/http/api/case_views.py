@@ -1,4 +1,4 @@
-"""The views of a case: an operation for each of `sprag.service.views.cases`, as JSON, CSV and mostly as a picture."""
+"""The views of a case: an operation for each of `sprag_study.service.views.cases`, as JSON, CSV and picture."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from starlette.responses import Response
 
-from sprag.service.http.api.document import CASE_PROBLEMS, files, format_query, problems
-from sprag.service.http.api.drawn_format import DrawnFormat
-from sprag.service.http.asked import asking
-from sprag.service.http.context import CaseNumber, StartNumber, StudyId
-from sprag.service.http.drawing import DRAWN_FORMATS, TABLE_FORMATS, picture, table
-from sprag.service.http.respond import choose_format
-from sprag.service.http.routers import api_router
-from sprag.service.http.work import Attended
-from sprag.service.views.case_view import case_file, drawn, see
-from sprag.service.views.cases import CASE_VIEWS
+from sprag_study.service.http.api.document import CASE_PROBLEMS, files, format_query, problems
+from sprag_study.service.http.api.drawn_format import DrawnFormat
+from sprag_study.service.http.asked import asking
+from sprag_study.service.http.context import CaseNumber, StartNumber, StudyId
+from sprag_study.service.http.drawing import DRAWN_FORMATS, TABLE_FORMATS, picture, table
+from sprag_study.service.http.respond import choose_format
+from sprag_study.service.http.routers import api_router
+from sprag_study.service.http.work import Attended
+from sprag_study.service.views.case_view import case_file, drawn, see
+from sprag_study.service.views.cases import CASE_VIEWS
 
 if TYPE_CHECKING:
-    from sprag.service.views.case_view import CaseView
+    from sprag_study.service.views.case_view import CaseView
 
 router = api_router("cases", "/studies/{study_id:study}/cases")
 

@@ -5,18 +5,18 @@ from __future__ import annotations
 from fastapi import Request
 from starlette.responses import Response
 
-from sprag.service.answers import results as m
-from sprag.service.http.api.document import next_page, problems
-from sprag.service.http.asked import asking
-from sprag.service.http.context import CaseNumber, Ctx, StudyId, study_with
-from sprag.service.http.respond import json_response, page_response
-from sprag.service.http.routers import api_router
-from sprag.service.http.threads import in_thread
-from sprag.service.http.views import case_detail
-from sprag.service.http.work import CHECK_PROBLEMS, Attended
-from sprag.service.views.case_pages import by_number, case_page, page_json, wanted
-from sprag.service.views.study_questions import CasesQuestion
-from sprag.service.views.study_view import FEW
+from sprag_study.service.answers import results as m
+from sprag_study.service.http.api.document import next_page, problems
+from sprag_study.service.http.asked import asking
+from sprag_study.service.http.context import CaseNumber, Ctx, StudyId, study_with
+from sprag_study.service.http.respond import json_response, page_response
+from sprag_study.service.http.routers import api_router
+from sprag_study.service.http.threads import in_thread
+from sprag_study.service.http.views import case_detail
+from sprag_study.service.http.work import CHECK_PROBLEMS, Attended
+from sprag_study.service.views.case_pages import by_number, case_page, page_json, wanted
+from sprag_study.service.views.study_questions import CasesQuestion
+from sprag_study.service.views.study_view import FEW
 
 router = api_router("cases", "/studies/{study_id:study}/cases")
 

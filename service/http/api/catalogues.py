@@ -6,16 +6,16 @@ from typing import Annotated, Any
 
 from fastapi import Path, Request
 
-from sprag.service.answers import catalogue as m
-from sprag.service.answers import filled
-from sprag.service.http.api.document import not_modified as documented_304
-from sprag.service.http.api.document import problems
-from sprag.service.http.problems import ApiError
-from sprag.service.http.respond import entity_tag, json_response, not_modified, tagged
-from sprag.service.http.routers import api_router
-from sprag.service.http.views import preset_of
-from sprag.service.presets import preset_names
-from sprag.worker import models
+from sprag_study.service.answers import catalogue as m
+from sprag_study.service.answers import filled
+from sprag_study.service.http.api.document import not_modified as documented_304
+from sprag_study.service.http.api.document import problems
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.http.respond import entity_tag, json_response, not_modified, tagged
+from sprag_study.service.http.routers import api_router
+from sprag_study.service.http.views import preset_of
+from sprag_study.service.presets import preset_names
+from sprag_study.worker import models
 
 router = api_router("models")
 

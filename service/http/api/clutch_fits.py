@@ -7,17 +7,17 @@ from typing import Annotated, Final
 from fastapi import Depends
 from starlette.responses import Response
 
-from sprag.service.answers import studies as m
-from sprag.service.http.api import examples
-from sprag.service.http.api.document import body, problems
-from sprag.service.http.problems import ApiError
-from sprag.service.http.requests import Body, read_body
-from sprag.service.http.respond import JSON
-from sprag.service.http.routers import api_router
-from sprag.service.http.work import CHECK_PROBLEMS, Attended
-from sprag.service.jobs import checks
-from sprag.service.results.fits import REQUEST
-from sprag.service.spec.report import SpecError
+from sprag_study.service.answers import studies as m
+from sprag_study.service.http.api import examples
+from sprag_study.service.http.api.document import body, problems
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.http.requests import Body, read_body
+from sprag_study.service.http.respond import JSON
+from sprag_study.service.http.routers import api_router
+from sprag_study.service.http.work import CHECK_PROBLEMS, Attended
+from sprag_study.service.jobs import checks
+from sprag_study.service.results.fits import REQUEST
+from sprag_study.service.spec.report import SpecError
 
 router = api_router("clutch")
 

@@ -7,18 +7,18 @@ from typing import Annotated, Any, Final, Literal
 from fastapi import Depends, Path, Query, Request
 from starlette.responses import Response
 
-from sprag.service.answers import components as m
-from sprag.service.answers import filled
-from sprag.service.exports.components import COMPONENT_FORMATS, components_csv
-from sprag.service.http.api.document import body, files, format_query, problems
-from sprag.service.http.context import ID_PATTERN, Ctx
-from sprag.service.http.requests import Body, IfMatch, as_body_problems, editions, read_body
-from sprag.service.http.respond import choose_format, json_response
-from sprag.service.http.routers import api_router
-from sprag.service.http.threads import in_thread
-from sprag.service.http.work import CHECK_PROBLEMS, Attended
-from sprag.service.jobs import checks
-from sprag.service.storage.components import ComponentRecord
+from sprag_study.service.answers import components as m
+from sprag_study.service.answers import filled
+from sprag_study.service.exports.components import COMPONENT_FORMATS, components_csv
+from sprag_study.service.http.api.document import body, files, format_query, problems
+from sprag_study.service.http.context import ID_PATTERN, Ctx
+from sprag_study.service.http.requests import Body, IfMatch, as_body_problems, editions, read_body
+from sprag_study.service.http.respond import choose_format, json_response
+from sprag_study.service.http.routers import api_router
+from sprag_study.service.http.threads import in_thread
+from sprag_study.service.http.work import CHECK_PROBLEMS, Attended
+from sprag_study.service.jobs import checks
+from sprag_study.service.storage.components import ComponentRecord
 
 router = api_router("components")
 

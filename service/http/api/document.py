@@ -10,14 +10,14 @@ from fastapi import FastAPI, Header, Query
 from fastapi.openapi.utils import get_openapi
 from typing_extensions import is_typeddict
 
-from sprag.service.answers import catalogue, people, results, saved_views, schedules, studies
-from sprag.service.faults import Fault, Kind, ParameterFault
-from sprag.service.http.api.answer_examples import add_answers
-from sprag.service.http.api.links import add_links
-from sprag.service.http.api.plain_schema import plain_schema
-from sprag.service.http.asked import one_of
-from sprag.service.http.problems import PROBLEM_MEDIA_TYPE, PROBLEM_TYPES, Problem, ProblemType, problem_json
-from sprag.service.http.views import API_PREFIX
+from sprag_study.service.answers import catalogue, people, results, saved_views, schedules, studies
+from sprag_study.service.faults import Fault, Kind, ParameterFault
+from sprag_study.service.http.api.answer_examples import add_answers
+from sprag_study.service.http.api.links import add_links
+from sprag_study.service.http.api.plain_schema import plain_schema
+from sprag_study.service.http.asked import one_of
+from sprag_study.service.http.problems import PROBLEM_MEDIA_TYPE, PROBLEM_TYPES, Problem, ProblemType, problem_json
+from sprag_study.service.http.views import API_PREFIX
 
 _METRICS: Final = "/metrics"
 _SCHEMAS: Final = "#/components/schemas/"

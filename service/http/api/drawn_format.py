@@ -6,13 +6,13 @@ from typing import Annotated, Any, Literal
 
 from fastapi import Depends, Query, Request
 
-from sprag.service import languages
-from sprag.service.faults import choice_of
-from sprag.service.figures.pictures import PICTURES, Picture
-from sprag.service.http.api.document import format_query
-from sprag.service.http.asked import one_of
-from sprag.service.http.drawing import DRAWN_FORMATS
-from sprag.service.http.respond import choose_format
+from sprag_study.service import languages
+from sprag_study.service.faults import choice_of
+from sprag_study.service.figures.pictures import PICTURES, Picture
+from sprag_study.service.http.api.document import format_query
+from sprag_study.service.http.asked import one_of
+from sprag_study.service.http.drawing import DRAWN_FORMATS
+from sprag_study.service.http.respond import choose_format
 
 
 def language_query(of: str) -> Any:

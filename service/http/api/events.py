@@ -7,13 +7,13 @@ from typing import Annotated
 from fastapi import Header
 from starlette.responses import Response, StreamingResponse
 
-from sprag.service.http import views
-from sprag.service.http.api.document import files, problems
-from sprag.service.http.context import Ctx, StudyId
-from sprag.service.http.looks import Seen
-from sprag.service.http.routers import api_router
-from sprag.service.http.streams import MEDIA_TYPE, event_stream
-from sprag.service.http.threads import Threads, in_thread
+from sprag_study.service.http import views
+from sprag_study.service.http.api.document import files, problems
+from sprag_study.service.http.context import Ctx, StudyId
+from sprag_study.service.http.looks import Seen
+from sprag_study.service.http.routers import api_router
+from sprag_study.service.http.streams import MEDIA_TYPE, event_stream
+from sprag_study.service.http.threads import Threads, in_thread
 
 router = api_router("studies")
 

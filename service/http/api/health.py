@@ -7,15 +7,15 @@ from typing import Any, cast
 from fastapi import Request
 from starlette.responses import Response
 
-from sprag.service.answers.catalogue import Health
-from sprag.service.http.api.document import files, problems
-from sprag.service.http.context import Context
-from sprag.service.http.metrics import CONTENT_TYPE, Metrics
-from sprag.service.http.problems import ApiError
-from sprag.service.http.respond import json_response
-from sprag.service.http.routers import api_router
-from sprag.service.http.threads import Threads, in_thread
-from sprag.service.storage.readiness import Readiness
+from sprag_study.service.answers.catalogue import Health
+from sprag_study.service.http.api.document import files, problems
+from sprag_study.service.http.context import Context
+from sprag_study.service.http.metrics import CONTENT_TYPE, Metrics
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.http.respond import json_response
+from sprag_study.service.http.routers import api_router
+from sprag_study.service.http.threads import Threads, in_thread
+from sprag_study.service.storage.readiness import Readiness
 
 router = api_router("health", prefix="")
 

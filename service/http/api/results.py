@@ -9,29 +9,29 @@ from typing import TYPE_CHECKING, Annotated, Final
 from fastapi import Query
 from starlette.responses import Response
 
-from sprag.sentences import Sentence
-from sprag.service import formats, languages, report
-from sprag.service.faults import FaultError, choice_of, parameter_error
-from sprag.service.http.api.document import CONTENT_RANGE, files, format_query, problems
-from sprag.service.http.api.document import not_modified as documented_304
-from sprag.service.http.api.drawn_format import language_query
-from sprag.service.http.api.study_views import PROBLEMS
-from sprag.service.http.asked import asking, one_of
-from sprag.service.http.context import StudyId
-from sprag.service.http.drawing import Drawing, attached, conditional, tag_of
-from sprag.service.http.kept_files import asks_for_part, file_response
-from sprag.service.http.reading import ReportChoice, TableUnits
-from sprag.service.http.respond import JSON, choose_format, not_modified, tagged
-from sprag.service.http.routers import api_router
-from sprag.service.http.threads import in_thread
-from sprag.service.http.work import CHECK_PROBLEMS, Attended, Work
-from sprag.service.reading.quantities import SI
-from sprag.service.views import row_files
-from sprag.service.views.study_questions import ReportQuestion
+from sprag_study.sentences import Sentence
+from sprag_study.service import formats, languages, report
+from sprag_study.service.faults import FaultError, choice_of, parameter_error
+from sprag_study.service.http.api.document import CONTENT_RANGE, files, format_query, problems
+from sprag_study.service.http.api.document import not_modified as documented_304
+from sprag_study.service.http.api.drawn_format import language_query
+from sprag_study.service.http.api.study_views import PROBLEMS
+from sprag_study.service.http.asked import asking, one_of
+from sprag_study.service.http.context import StudyId
+from sprag_study.service.http.drawing import Drawing, attached, conditional, tag_of
+from sprag_study.service.http.kept_files import asks_for_part, file_response
+from sprag_study.service.http.reading import ReportChoice, TableUnits
+from sprag_study.service.http.respond import JSON, choose_format, not_modified, tagged
+from sprag_study.service.http.routers import api_router
+from sprag_study.service.http.threads import in_thread
+from sprag_study.service.http.work import CHECK_PROBLEMS, Attended, Work
+from sprag_study.service.reading.quantities import SI
+from sprag_study.service.views import row_files
+from sprag_study.service.views.study_questions import ReportQuestion
 
 if TYPE_CHECKING:
-    from sprag.service.storage.studies.records import StudyRecord
-    from sprag.service.views.library import Library
+    from sprag_study.service.storage.studies.records import StudyRecord
+    from sprag_study.service.views.library import Library
 
 _LOG = logging.getLogger("sprag.service")
 router = api_router("results", "/studies/{study_id:study}")

@@ -7,19 +7,19 @@ from typing import Annotated, Any, Final
 from fastapi import Depends, Path, Query
 from starlette.responses import Response
 
-from sprag.service.answers import filled
-from sprag.service.answers import saved_views as m
-from sprag.service.http.api.document import body, problems
-from sprag.service.http.context import ID_PATTERN, Ctx
-from sprag.service.http.requests import Body, IfMatch, as_body_problems, editions, read_body
-from sprag.service.http.respond import json_response
-from sprag.service.http.routers import api_router
-from sprag.service.http.threads import in_thread
-from sprag.service.http.work import CHECK_PROBLEMS, Attended
-from sprag.service.jobs import checks
-from sprag.service.jobs.saved_views import change_view as change
-from sprag.service.jobs.saved_views import save_view as save
-from sprag.service.storage.saved_views import SavedView
+from sprag_study.service.answers import filled
+from sprag_study.service.answers import saved_views as m
+from sprag_study.service.http.api.document import body, problems
+from sprag_study.service.http.context import ID_PATTERN, Ctx
+from sprag_study.service.http.requests import Body, IfMatch, as_body_problems, editions, read_body
+from sprag_study.service.http.respond import json_response
+from sprag_study.service.http.routers import api_router
+from sprag_study.service.http.threads import in_thread
+from sprag_study.service.http.work import CHECK_PROBLEMS, Attended
+from sprag_study.service.jobs import checks
+from sprag_study.service.jobs.saved_views import change_view as change
+from sprag_study.service.jobs.saved_views import save_view as save
+from sprag_study.service.storage.saved_views import SavedView
 
 router = api_router("studies")
 

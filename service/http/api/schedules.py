@@ -8,29 +8,29 @@ from fastapi import Depends, Path, Query
 from starlette.convertors import register_url_convertor
 from starlette.responses import Response
 
-from sprag.service.answers import schedules as m
-from sprag.service.http.api import examples
-from sprag.service.http.api.document import body, key_header, located, problems
-from sprag.service.http.context import ID_PATTERN, Context, Ctx, StudyIdConvertor
-from sprag.service.http.requests import Body, IfMatch, as_body_problems, editions, read_body
-from sprag.service.http.respond import edition_tag, json_response, tagged
-from sprag.service.http.routers import api_router
-from sprag.service.http.schedule_views import detail, listed, schedule_address
-from sprag.service.http.threads import in_thread
-from sprag.service.http.work import CHECK_PROBLEMS, Attended, Work
-from sprag.service.jobs import checks
-from sprag.service.jobs.nights import HOURS, MOST_HOURS, night
-from sprag.service.schedules.deadline import ALLOWED_OF_RUNS
-from sprag.service.schedules.fields import PLAIN, ScheduleFields
-from sprag.service.schedules.policies import GRACE_ALLOWED
-from sprag.service.schedules.report_to import LONGEST_WEBHOOK, MOST_RECIPIENTS, require_deliverable
-from sprag.service.schedules.times import ALIASES
-from sprag.service.spec.described import schemas
-from sprag.service.storage.errors import ChangedMeanwhileError
-from sprag.service.storage.people.audit import require_edition
-from sprag.service.storage.schedules.runs import ScheduleRecord
-from sprag.worker.codes import FLAG_MASKS
-from sprag.worker.limits import MAX_NAME_LENGTH
+from sprag_study.service.answers import schedules as m
+from sprag_study.service.http.api import examples
+from sprag_study.service.http.api.document import body, key_header, located, problems
+from sprag_study.service.http.context import ID_PATTERN, Context, Ctx, StudyIdConvertor
+from sprag_study.service.http.requests import Body, IfMatch, as_body_problems, editions, read_body
+from sprag_study.service.http.respond import edition_tag, json_response, tagged
+from sprag_study.service.http.routers import api_router
+from sprag_study.service.http.schedule_views import detail, listed, schedule_address
+from sprag_study.service.http.threads import in_thread
+from sprag_study.service.http.work import CHECK_PROBLEMS, Attended, Work
+from sprag_study.service.jobs import checks
+from sprag_study.service.jobs.nights import HOURS, MOST_HOURS, night
+from sprag_study.service.schedules.deadline import ALLOWED_OF_RUNS
+from sprag_study.service.schedules.fields import PLAIN, ScheduleFields
+from sprag_study.service.schedules.policies import GRACE_ALLOWED
+from sprag_study.service.schedules.report_to import LONGEST_WEBHOOK, MOST_RECIPIENTS, require_deliverable
+from sprag_study.service.schedules.times import ALIASES
+from sprag_study.service.spec.described import schemas
+from sprag_study.service.storage.errors import ChangedMeanwhileError
+from sprag_study.service.storage.people.audit import require_edition
+from sprag_study.service.storage.schedules.runs import ScheduleRecord
+from sprag_study.worker.codes import FLAG_MASKS
+from sprag_study.worker.limits import MAX_NAME_LENGTH
 
 router = api_router("schedules")
 

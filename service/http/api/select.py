@@ -6,17 +6,17 @@ from dataclasses import asdict
 
 from starlette.responses import Response
 
-from sprag.service.answers.studies import StudySummary
-from sprag.service.http.api.document import located, problems
-from sprag.service.http.api.studies import SelectKey, given_options, taken_in
-from sprag.service.http.asked import asking
-from sprag.service.http.context import Ctx, StudyId
-from sprag.service.http.routers import api_router
-from sprag.service.http.threads import in_thread
-from sprag.service.http.work import CHECK_PROBLEMS, Attended
-from sprag.service.jobs import checks
-from sprag.service.views.explore import selection
-from sprag.service.views.study_questions import SelectQuestion
+from sprag_study.service.answers.studies import StudySummary
+from sprag_study.service.http.api.document import located, problems
+from sprag_study.service.http.api.studies import SelectKey, given_options, taken_in
+from sprag_study.service.http.asked import asking
+from sprag_study.service.http.context import Ctx, StudyId
+from sprag_study.service.http.routers import api_router
+from sprag_study.service.http.threads import in_thread
+from sprag_study.service.http.work import CHECK_PROBLEMS, Attended
+from sprag_study.service.jobs import checks
+from sprag_study.service.views.explore import selection
+from sprag_study.service.views.study_questions import SelectQuestion
 
 router = api_router(path="/studies/{study_id:study}")
 

@@ -9,25 +9,25 @@ from fastapi import Depends, Query, Request
 from pydantic import Field
 from starlette.responses import Response
 
-from sprag.service.answers import studies as m
-from sprag.service.faults import parameter_error
-from sprag.service.http import views
-from sprag.service.http.api import examples
-from sprag.service.http.api.document import body, key_header, located, problems
-from sprag.service.http.api.document import not_modified as documented_304
-from sprag.service.http.asked import one_of
-from sprag.service.http.context import Context, Ctx, StudyId
-from sprag.service.http.requests import Body, read_body
-from sprag.service.http.respond import JSON, json_response, not_modified, tagged
-from sprag.service.http.routers import api_router
-from sprag.service.http.threads import in_thread
-from sprag.service.http.work import CHECK_PROBLEMS, Attended
-from sprag.service.jobs import checks
-from sprag.service.jobs.submission import Submission, take_in
-from sprag.service.results.rounds import round_json
-from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at
-from sprag.service.views.curves import pairs
-from sprag.worker.limits import (
+from sprag_study.service.answers import studies as m
+from sprag_study.service.faults import parameter_error
+from sprag_study.service.http import views
+from sprag_study.service.http.api import examples
+from sprag_study.service.http.api.document import body, key_header, located, problems
+from sprag_study.service.http.api.document import not_modified as documented_304
+from sprag_study.service.http.asked import one_of
+from sprag_study.service.http.context import Context, Ctx, StudyId
+from sprag_study.service.http.requests import Body, read_body
+from sprag_study.service.http.respond import JSON, json_response, not_modified, tagged
+from sprag_study.service.http.routers import api_router
+from sprag_study.service.http.threads import in_thread
+from sprag_study.service.http.work import CHECK_PROBLEMS, Attended
+from sprag_study.service.jobs import checks
+from sprag_study.service.jobs.submission import Submission, take_in
+from sprag_study.service.results.rounds import round_json
+from sprag_study.service.schedules.deadline import ALLOWED, FinishError, finish_at
+from sprag_study.service.views.curves import pairs
+from sprag_study.worker.limits import (
     MAX_NARROW_STEPS,
     MAX_PRIORITY,
     MAX_SETTLED_PERIODS,
@@ -35,7 +35,7 @@ from sprag.worker.limits import (
     MIN_SETTLED_PERIODS,
     NARROW_STEPS,
 )
-from sprag.worker.models import ENDING_SENTENCES, OK, REGIME_SENTENCES, WorkerEnding
+from sprag_study.worker.models import ENDING_SENTENCES, OK, REGIME_SENTENCES, WorkerEnding
 
 router = api_router("studies")
 

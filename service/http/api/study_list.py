@@ -7,19 +7,19 @@ from typing import Annotated
 from fastapi import Depends, Query, Request
 from starlette.responses import Response
 
-from sprag.service.answers import studies as m
-from sprag.service.answers.studies import StudyOrder
-from sprag.service.http import views
-from sprag.service.http.api.document import body, next_page, problems
-from sprag.service.http.context import Ctx, StudyId
-from sprag.service.http.listing import PageToken, Sort, WantedStudies
-from sprag.service.http.requests import Body, IfMatch, as_body_problems, editions, read_body
-from sprag.service.http.respond import json_response, page_response, tagged
-from sprag.service.http.routers import api_router
-from sprag.service.http.threads import in_thread
-from sprag.service.http.work import CHECK_PROBLEMS, Attended
-from sprag.service.jobs import checks
-from sprag.worker.limits import MAX_PAGE_SIZE
+from sprag_study.service.answers import studies as m
+from sprag_study.service.answers.studies import StudyOrder
+from sprag_study.service.http import views
+from sprag_study.service.http.api.document import body, next_page, problems
+from sprag_study.service.http.context import Ctx, StudyId
+from sprag_study.service.http.listing import PageToken, Sort, WantedStudies
+from sprag_study.service.http.requests import Body, IfMatch, as_body_problems, editions, read_body
+from sprag_study.service.http.respond import json_response, page_response, tagged
+from sprag_study.service.http.routers import api_router
+from sprag_study.service.http.threads import in_thread
+from sprag_study.service.http.work import CHECK_PROBLEMS, Attended
+from sprag_study.service.jobs import checks
+from sprag_study.worker.limits import MAX_PAGE_SIZE
 
 router = api_router("studies")
 

@@ -1,4 +1,4 @@
-"""The views of a study: an operation for each of `sprag.service.views.studies`, as JSON, CSV and pictures."""
+"""The views of a study: an operation for each of `sprag_study.service.views.studies`, as JSON, CSV and pictures."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ from typing import TYPE_CHECKING, Any
 
 from starlette.responses import Response
 
-from sprag.service.figures.pictures import PICTURES
-from sprag.service.http.api.document import files, not_modified, problems
-from sprag.service.http.api.drawn_format import DrawnFormat
-from sprag.service.http.asked import asking
-from sprag.service.http.context import StudyId
-from sprag.service.http.drawing import DRAWN_FORMATS, Drawing, attached, conditional, picture
-from sprag.service.http.reading import FileChoice
-from sprag.service.http.routers import api_router
-from sprag.service.http.work import CHECK_PROBLEMS, Attended
-from sprag.service.views.studies import STUDY_VIEWS
-from sprag.service.views.study_view import study_file
+from sprag_study.service.figures.pictures import PICTURES
+from sprag_study.service.http.api.document import files, not_modified, problems
+from sprag_study.service.http.api.drawn_format import DrawnFormat
+from sprag_study.service.http.asked import asking
+from sprag_study.service.http.context import StudyId
+from sprag_study.service.http.drawing import DRAWN_FORMATS, Drawing, attached, conditional, picture
+from sprag_study.service.http.reading import FileChoice
+from sprag_study.service.http.routers import api_router
+from sprag_study.service.http.work import CHECK_PROBLEMS, Attended
+from sprag_study.service.views.studies import STUDY_VIEWS
+from sprag_study.service.views.study_view import study_file
 
 if TYPE_CHECKING:
-    from sprag.service.storage.studies.records import StudyRecord
-    from sprag.service.views.study_view import StudyView
+    from sprag_study.service.storage.studies.records import StudyRecord
+    from sprag_study.service.views.study_view import StudyView
 
 router = api_router("results", "/studies/{study_id:study}")
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from sprag.service.answers import workers as m
-from sprag.service.http.api.document import problems
-from sprag.service.http.context import Ctx
-from sprag.service.http.respond import json_response
-from sprag.service.http.routers import api_router
-from sprag.service.jobs.workers import worker_list
+from sprag_study.service.answers import workers as m
+from sprag_study.service.http.api.document import problems
+from sprag_study.service.http.context import Ctx
+from sprag_study.service.http.respond import json_response
+from sprag_study.service.http.routers import api_router
+from sprag_study.service.jobs.workers import worker_list
 
 router = api_router("workers")
 

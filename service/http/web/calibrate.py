@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from sprag.service.faults import Fault
-from sprag.service.http.context import Context
-from sprag.service.http.web.form.entries import range_of
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.reader import Reading
-from sprag.service.spec.kinds.registry import without_cases
-from sprag.worker import models
-from sprag.worker.limits import MAX_NAME_LENGTH
-from sprag.worker.planning.calibrate.plan import LOSSES
+from sprag_study.service.faults import Fault
+from sprag_study.service.http.context import Context
+from sprag_study.service.http.web.form.entries import range_of
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.reader import Reading
+from sprag_study.service.spec.kinds.registry import without_cases
+from sprag_study.worker import models
+from sprag_study.worker.limits import MAX_NAME_LENGTH
+from sprag_study.worker.planning.calibrate.plan import LOSSES
 
 #: Rows for unknown parameters.
 ROWS: Final = 6

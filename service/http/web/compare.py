@@ -8,20 +8,20 @@ from urllib.parse import urlencode
 
 from starlette.responses import Response
 
-from sprag.service.answers.differing import MOST_COMPARED
-from sprag.service.faults import SelectionError
-from sprag.service.figures import pictures
-from sprag.service.figures.pictures import draw_compare
-from sprag.service.formats import MEDIA_TYPES
-from sprag.service.http import views
-from sprag.service.http.context import Context
-from sprag.service.http.current import current
-from sprag.service.http.drawing import Drawing, attached, picture, tag_of, unless_known
-from sprag.service.http.reading import FileChoice, address_pairs
-from sprag.service.http.routers import page_router
-from sprag.service.http.threads import in_thread
-from sprag.service.http.web.comparison.answer import Answer, answer_of, charted, curves_each
-from sprag.service.http.web.comparison.chosen import (
+from sprag_study.service.answers.differing import MOST_COMPARED
+from sprag_study.service.faults import SelectionError
+from sprag_study.service.figures import pictures
+from sprag_study.service.figures.pictures import draw_compare
+from sprag_study.service.formats import MEDIA_TYPES
+from sprag_study.service.http import views
+from sprag_study.service.http.context import Context
+from sprag_study.service.http.current import current
+from sprag_study.service.http.drawing import Drawing, attached, picture, tag_of, unless_known
+from sprag_study.service.http.reading import FileChoice, address_pairs
+from sprag_study.service.http.routers import page_router
+from sprag_study.service.http.threads import in_thread
+from sprag_study.service.http.web.comparison.answer import Answer, answer_of, charted, curves_each
+from sprag_study.service.http.web.comparison.chosen import (
     Comparison,
     chosen_studies,
     comparison,
@@ -30,33 +30,33 @@ from sprag.service.http.web.comparison.chosen import (
     labels,
     told_apart_by,
 )
-from sprag.service.http.web.held import fixed_choices
-from sprag.service.http.web.saved_views import saved_here
-from sprag.service.http.web.templates import page
-from sprag.service.http.work import Attended, Work
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.faults import fault_text
-from sprag.service.reading.part_names import upper_first
-from sprag.service.reading.reader import reading_for
-from sprag.service.results.differences import compared_csv
-from sprag.service.results.differing_inputs import DifferingInput, ReadStudy, differing_inputs
-from sprag.service.results.selection import value_of
-from sprag.service.storage.errors import StudyNotFoundError
-from sprag.service.storage.studies.listing import StudyFilter
-from sprag.service.views.headline import is_small
-from sprag.service.views.library import reading_of
-from sprag.service.views.listed import about
-from sprag.worker.limits import MAX_SEARCH_LENGTH
+from sprag_study.service.http.web.held import fixed_choices
+from sprag_study.service.http.web.saved_views import saved_here
+from sprag_study.service.http.web.templates import page
+from sprag_study.service.http.work import Attended, Work
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.faults import fault_text
+from sprag_study.service.reading.part_names import upper_first
+from sprag_study.service.reading.reader import reading_for
+from sprag_study.service.results.differences import compared_csv
+from sprag_study.service.results.differing_inputs import DifferingInput, ReadStudy, differing_inputs
+from sprag_study.service.results.selection import value_of
+from sprag_study.service.storage.errors import StudyNotFoundError
+from sprag_study.service.storage.studies.listing import StudyFilter
+from sprag_study.service.views.headline import is_small
+from sprag_study.service.views.library import reading_of
+from sprag_study.service.views.listed import about
+from sprag_study.worker.limits import MAX_SEARCH_LENGTH
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Sequence
 
     from starlette.datastructures import QueryParams
 
-    from sprag.service.faults import Fault
-    from sprag.service.reading.reader import Choice, Reading
-    from sprag.service.results.curves import Curves
-    from sprag.service.storage.studies.records import StudyRecord
+    from sprag_study.service.faults import Fault
+    from sprag_study.service.reading.reader import Choice, Reading
+    from sprag_study.service.results.curves import Curves
+    from sprag_study.service.storage.studies.records import StudyRecord
 
 router = page_router()
 

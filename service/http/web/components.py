@@ -9,28 +9,28 @@ from typing import Annotated
 from fastapi import Query
 from starlette.responses import RedirectResponse, Response
 
-from sprag.service.faults import Fault, FaultError
-from sprag.service.http.context import Context, Ctx
-from sprag.service.http.current import current
-from sprag.service.http.problems import api_error
-from sprag.service.http.routers import page_router
-from sprag.service.http.threads import in_thread
-from sprag.service.http.web.form.entries import Faults, Values
-from sprag.service.http.web.form.sent import settle
-from sprag.service.http.web.form.sheet import Quantity, preferred, quantity_of
-from sprag.service.http.web.form.values import Form
-from sprag.service.http.web.templates import page
-from sprag.service.http.work import Attended
-from sprag.service.jobs import checks
-from sprag.service.json_text import to_bytes
-from sprag.service.languages import gettext
-from sprag.service.reading.faults import message
-from sprag.service.reading.numbers import parse_number
-from sprag.service.reading.quantities import TYPED, Units, offered, read_units
-from sprag.service.reading.reader import Reading
-from sprag.service.reading.units import QuantityError, examples, parse_quantity, split_quantity
-from sprag.service.reading.wording import typed_text, words
-from sprag.service.spec.components import (
+from sprag_study.service.faults import Fault, FaultError
+from sprag_study.service.http.context import Context, Ctx
+from sprag_study.service.http.current import current
+from sprag_study.service.http.problems import api_error
+from sprag_study.service.http.routers import page_router
+from sprag_study.service.http.threads import in_thread
+from sprag_study.service.http.web.form.entries import Faults, Values
+from sprag_study.service.http.web.form.sent import settle
+from sprag_study.service.http.web.form.sheet import Quantity, preferred, quantity_of
+from sprag_study.service.http.web.form.values import Form
+from sprag_study.service.http.web.templates import page
+from sprag_study.service.http.work import Attended
+from sprag_study.service.jobs import checks
+from sprag_study.service.json_text import to_bytes
+from sprag_study.service.languages import gettext
+from sprag_study.service.reading.faults import message
+from sprag_study.service.reading.numbers import parse_number
+from sprag_study.service.reading.quantities import TYPED, Units, offered, read_units
+from sprag_study.service.reading.reader import Reading
+from sprag_study.service.reading.units import QuantityError, examples, parse_quantity, split_quantity
+from sprag_study.service.reading.wording import typed_text, words
+from sprag_study.service.spec.components import (
     COEFFICIENTS,
     KINDS,
     Component,
@@ -41,9 +41,9 @@ from sprag.service.spec.components import (
     needed,
     require_component,
 )
-from sprag.service.storage.errors import ComponentNotFoundError
-from sprag.worker.limits import MAX_COMPONENTS
-from sprag.worker.models.parameters import placed
+from sprag_study.service.storage.errors import ComponentNotFoundError
+from sprag_study.worker.limits import MAX_COMPONENTS
+from sprag_study.worker.models.parameters import placed
 
 router = page_router()
 

@@ -12,30 +12,30 @@ from urllib.parse import urlencode
 
 from starlette.responses import RedirectResponse, Response, StreamingResponse
 
-from sprag.service.faults import FaultError
-from sprag.service.http import views
-from sprag.service.http.asked import asking
-from sprag.service.http.context import Ctx, StudyId
-from sprag.service.http.current import current
-from sprag.service.http.reading import page_query
-from sprag.service.http.routers import page_router
-from sprag.service.http.threads import in_thread
-from sprag.service.http.web.saved_views import saved_here, view_actions
-from sprag.service.http.web.templates import fragment
-from sprag.service.http.work import Attended
-from sprag.service.languages import _, pgettext
-from sprag.service.report import Office
-from sprag.service.report.document import LONGEST_TEXT
-from sprag.service.report.html import embedded
-from sprag.service.report.page import Shown, shown_document
-from sprag.service.views.library import reading_of
-from sprag.service.views.study_questions import ReportQuestion
+from sprag_study.service.faults import FaultError
+from sprag_study.service.http import views
+from sprag_study.service.http.asked import asking
+from sprag_study.service.http.context import Ctx, StudyId
+from sprag_study.service.http.current import current
+from sprag_study.service.http.reading import page_query
+from sprag_study.service.http.routers import page_router
+from sprag_study.service.http.threads import in_thread
+from sprag_study.service.http.web.saved_views import saved_here, view_actions
+from sprag_study.service.http.web.templates import fragment
+from sprag_study.service.http.work import Attended
+from sprag_study.service.languages import _, pgettext
+from sprag_study.service.report import Office
+from sprag_study.service.report.document import LONGEST_TEXT
+from sprag_study.service.report.html import embedded
+from sprag_study.service.report.page import Shown, shown_document
+from sprag_study.service.views.library import reading_of
+from sprag_study.service.views.study_questions import ReportQuestion
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Awaitable, Callable
 
-    from sprag.service.faults import Fault
-    from sprag.service.http.context import Context
+    from sprag_study.service.faults import Fault
+    from sprag_study.service.http.context import Context
 
     Render = Callable[[Shown | None, tuple[Fault, ...]], str]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from sprag.worker import models
+from sprag_study.worker import models
 
 #: Page and heading by the beginning of a pointer into a spec, without numbers; the machine's own are the model's.
 _SECTIONS: Final = {

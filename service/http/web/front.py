@@ -6,21 +6,21 @@ from typing import TYPE_CHECKING
 
 from starlette.responses import Response
 
-from sprag.service.figures.front import history_figure
-from sprag.service.figures.pictures import draw_figure
-from sprag.service.figures.read import read_figure
-from sprag.service.http.context import StudyId
-from sprag.service.http.drawing import Drawing, conditional, picture
-from sprag.service.http.reading import FileChoice
-from sprag.service.http.routers import page_router
-from sprag.service.http.work import Attended
-from sprag.service.views.library import reading_of
+from sprag_study.service.figures.front import history_figure
+from sprag_study.service.figures.pictures import draw_figure
+from sprag_study.service.figures.read import read_figure
+from sprag_study.service.http.context import StudyId
+from sprag_study.service.http.drawing import Drawing, conditional, picture
+from sprag_study.service.http.reading import FileChoice
+from sprag_study.service.http.routers import page_router
+from sprag_study.service.http.work import Attended
+from sprag_study.service.views.library import reading_of
 
 if TYPE_CHECKING:
-    from sprag.service.figures.pictures import Picture
-    from sprag.service.reading.reader import Choice
-    from sprag.service.storage.studies.records import StudyRecord
-    from sprag.service.views.library import Library
+    from sprag_study.service.figures.pictures import Picture
+    from sprag_study.service.reading.reader import Choice
+    from sprag_study.service.storage.studies.records import StudyRecord
+    from sprag_study.service.views.library import Library
 
 router = page_router()
 

@@ -9,26 +9,26 @@ from typing import TYPE_CHECKING, Any
 from fastapi import Request
 from starlette.responses import RedirectResponse, Response
 
-from sprag.sentences import Place, Sentence, WarningText
-from sprag.service.faults import FaultError, parameter_error
-from sprag.service.http.context import Ctx, StudyId
-from sprag.service.http.routers import page_router
-from sprag.service.http.threads import in_thread
-from sprag.service.http.web.form.entries import Faults, Values, items_of, list_of
-from sprag.service.http.web.form.values import Form
-from sprag.service.http.web.sheet.drawer import with_query
-from sprag.service.http.web.study import shown_study
-from sprag.service.http.work import Attended
-from sprag.service.jobs import checks
-from sprag.service.jobs.submission import take_in
-from sprag.service.reading.faults import message
-from sprag.service.reading.numbers import assumption, parse_number, settle
-from sprag.worker.limits import MAX_PRIORITY
+from sprag_study.sentences import Place, Sentence, WarningText
+from sprag_study.service.faults import FaultError, parameter_error
+from sprag_study.service.http.context import Ctx, StudyId
+from sprag_study.service.http.routers import page_router
+from sprag_study.service.http.threads import in_thread
+from sprag_study.service.http.web.form.entries import Faults, Values, items_of, list_of
+from sprag_study.service.http.web.form.values import Form
+from sprag_study.service.http.web.sheet.drawer import with_query
+from sprag_study.service.http.web.study import shown_study
+from sprag_study.service.http.work import Attended
+from sprag_study.service.jobs import checks
+from sprag_study.service.jobs.submission import take_in
+from sprag_study.service.reading.faults import message
+from sprag_study.service.reading.numbers import assumption, parse_number, settle
+from sprag_study.worker.limits import MAX_PRIORITY
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.faults import Fault
+    from sprag_study.service.faults import Fault
 
 router = page_router()
 

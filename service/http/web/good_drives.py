@@ -6,18 +6,18 @@ from dataclasses import dataclass
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.languages import N_
-from sprag.service.reading.units import has_unit
-from sprag.service.results.tolerances.conditions import split_condition
-from sprag.worker import models
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.units import has_unit
+from sprag_study.service.results.tolerances.conditions import split_condition
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from starlette.datastructures import QueryParams
 
-    from sprag.service.reading.reader import Reading
-    from sprag.worker.study import Study
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.worker.study import Study
 
 #: The fields of a row: result, relation, value, and what the value is.
 _FIELDS: Final = ("of", "is", "value", "part")

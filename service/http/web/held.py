@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 from starlette.datastructures import QueryParams
 
-from sprag.service.faults import SelectionError
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.results.defaults import MOST_CHOICES
-from sprag.service.results.selection import value_of
-from sprag.worker.directions import DIRECTIONS, SWEEP
+from sprag_study.service.faults import SelectionError
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.results.defaults import MOST_CHOICES
+from sprag_study.service.results.selection import value_of
+from sprag_study.worker.directions import DIRECTIONS, SWEEP
 
 if TYPE_CHECKING:
-    from sprag.service.reading.reader import Reading
-    from sprag.worker.study import Study
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.worker.study import Study
 
 #: Beginning of the name of a field with the value of an axis that has too many to choose from.
 _FIELD: Final = "at:"

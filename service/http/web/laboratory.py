@@ -8,10 +8,10 @@ from urllib.parse import urlencode
 from fastapi import Request
 from starlette.responses import RedirectResponse
 
-from sprag.sentences import Sentence
-from sprag.service.http.problems import ApiError
-from sprag.service.http.routers import page_router
-from sprag.worker import models
+from sprag_study.sentences import Sentence
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.http.routers import page_router
+from sprag_study.worker import models
 
 router = page_router()
 

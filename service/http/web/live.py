@@ -8,22 +8,22 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from fastapi import Header, Query, Request
 from starlette.responses import Response
 
-from sprag.sentences import Sentence
-from sprag.service import languages
-from sprag.service.http import streams
-from sprag.service.http.context import Context, Ctx
-from sprag.service.http.current import current
-from sprag.service.http.looks import Seen
-from sprag.service.http.problems import ApiError
-from sprag.service.http.routers import page_router
-from sprag.service.http.schedule_views import listed as all_schedules
-from sprag.service.http.streams import event_stream
-from sprag.service.http.threads import Threads, in_thread
-from sprag.service.http.web.study_list import listed
-from sprag.service.jobs.nights import HOURS, MOST_HOURS, night
-from sprag.service.jobs.workers import worker_list
-from sprag.service.json_text import to_bytes
-from sprag.service.views.listed import known
+from sprag_study.sentences import Sentence
+from sprag_study.service import languages
+from sprag_study.service.http import streams
+from sprag_study.service.http.context import Context, Ctx
+from sprag_study.service.http.current import current
+from sprag_study.service.http.looks import Seen
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.http.routers import page_router
+from sprag_study.service.http.schedule_views import listed as all_schedules
+from sprag_study.service.http.streams import event_stream
+from sprag_study.service.http.threads import Threads, in_thread
+from sprag_study.service.http.web.study_list import listed
+from sprag_study.service.jobs.nights import HOURS, MOST_HOURS, night
+from sprag_study.service.jobs.workers import worker_list
+from sprag_study.service.json_text import to_bytes
+from sprag_study.service.views.listed import known
 
 if TYPE_CHECKING:
     from collections.abc import Callable

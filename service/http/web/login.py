@@ -5,14 +5,14 @@ from __future__ import annotations
 from fastapi import Request
 from starlette.responses import RedirectResponse, Response
 
-from sprag.service.actor import Role
-from sprag.service.http.access import COOKIE, SESSION_SECONDS
-from sprag.service.http.problems import ApiError
-from sprag.service.http.routers import page_router
-from sprag.service.http.web.form.values import Form
-from sprag.service.http.web.way_in import LOGIN_PATH, access_of, kept_form, kept_page, login_page, within
-from sprag.service.languages import _
-from sprag.service.reading.reader import told
+from sprag_study.service.actor import Role
+from sprag_study.service.http.access import COOKIE, SESSION_SECONDS
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.http.routers import page_router
+from sprag_study.service.http.web.form.values import Form
+from sprag_study.service.http.web.way_in import LOGIN_PATH, access_of, kept_form, kept_page, login_page, within
+from sprag_study.service.languages import _
+from sprag_study.service.reading.reader import told
 
 router = page_router()
 

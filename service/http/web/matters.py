@@ -12,20 +12,20 @@ from fastapi import Query, Request
 from starlette.datastructures import QueryParams
 from starlette.responses import RedirectResponse, Response
 
-from sprag.sentences import Sentence
-from sprag.service.faults import Fault, FaultError, SelectionError
-from sprag.service.figures.ribbons import batch_figure
-from sprag.service.http.context import ID_PATTERN, Context, Ctx, StudyId
-from sprag.service.http.current import current
-from sprag.service.http.problems import ApiError, api_error
-from sprag.service.http.reading import file_pairs
-from sprag.service.http.routers import page_router
-from sprag.service.http.threads import in_thread
-from sprag.service.http.views import study_address
-from sprag.service.http.web import calibrate
-from sprag.service.http.web.figures.drawn import cases_of
-from sprag.service.http.web.form.values import Form
-from sprag.service.http.web.good_drives import (
+from sprag_study.sentences import Sentence
+from sprag_study.service.faults import Fault, FaultError, SelectionError
+from sprag_study.service.figures.ribbons import batch_figure
+from sprag_study.service.http.context import ID_PATTERN, Context, Ctx, StudyId
+from sprag_study.service.http.current import current
+from sprag_study.service.http.problems import ApiError, api_error
+from sprag_study.service.http.reading import file_pairs
+from sprag_study.service.http.routers import page_router
+from sprag_study.service.http.threads import in_thread
+from sprag_study.service.http.views import study_address
+from sprag_study.service.http.web import calibrate
+from sprag_study.service.http.web.figures.drawn import cases_of
+from sprag_study.service.http.web.form.values import Form
+from sprag_study.service.http.web.good_drives import (
     PARTS,
     RELATIONS,
     condition_rows,
@@ -34,36 +34,36 @@ from sprag.service.http.web.good_drives import (
     has_rows,
     without_rows,
 )
-from sprag.service.http.web.held import fixed_choices, with_held
-from sprag.service.http.web.study import study_frame
-from sprag.service.http.web.templates import page
-from sprag.service.http.web.view_forms import Asked, Seen, asked_of, fact_of, files_of, inline
-from sprag.service.http.work import Attended
-from sprag.service.jobs import checks
-from sprag.service.jobs.submission import take_in
-from sprag.service.languages import N_
-from sprag.service.results.choice import held
-from sprag.service.results.headlines.batch import with_yield
-from sprag.service.results.headlines.headline import Headline
-from sprag.service.results.headlines.influence import influence_headline
-from sprag.service.spec.stored import accepted
-from sprag.service.views.batch import batch_shown
-from sprag.service.views.drives import RibbonView
-from sprag.service.views.headline import headline_of
-from sprag.service.views.library import reading_of
-from sprag.service.views.sensitivity import SensitivityView
-from sprag.service.views.studies import STUDY_VIEWS
-from sprag.service.views.study_view import StudyAnswer
-from sprag.worker.spread import DRIVE
+from sprag_study.service.http.web.held import fixed_choices, with_held
+from sprag_study.service.http.web.study import study_frame
+from sprag_study.service.http.web.templates import page
+from sprag_study.service.http.web.view_forms import Asked, Seen, asked_of, fact_of, files_of, inline
+from sprag_study.service.http.work import Attended
+from sprag_study.service.jobs import checks
+from sprag_study.service.jobs.submission import take_in
+from sprag_study.service.languages import N_
+from sprag_study.service.results.choice import held
+from sprag_study.service.results.headlines.batch import with_yield
+from sprag_study.service.results.headlines.headline import Headline
+from sprag_study.service.results.headlines.influence import influence_headline
+from sprag_study.service.spec.stored import accepted
+from sprag_study.service.views.batch import batch_shown
+from sprag_study.service.views.drives import RibbonView
+from sprag_study.service.views.headline import headline_of
+from sprag_study.service.views.library import reading_of
+from sprag_study.service.views.sensitivity import SensitivityView
+from sprag_study.service.views.studies import STUDY_VIEWS
+from sprag_study.service.views.study_view import StudyAnswer
+from sprag_study.worker.spread import DRIVE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from sprag.service.http.work import Work
-    from sprag.service.jobs.submission import Submission
-    from sprag.service.reading.reader import Choice
-    from sprag.service.views.library import Library
-    from sprag.worker.study import Study
+    from sprag_study.service.http.work import Work
+    from sprag_study.service.jobs.submission import Submission
+    from sprag_study.service.reading.reader import Choice
+    from sprag_study.service.views.library import Library
+    from sprag_study.worker.study import Study
 
 router = page_router()
 

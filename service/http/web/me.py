@@ -7,34 +7,34 @@ from typing import TYPE_CHECKING, Annotated, Final
 from fastapi import Query, Request
 from starlette.responses import RedirectResponse, Response
 
-from sprag.service import languages
-from sprag.service.exports.audit import entry_json
-from sprag.service.faults import FaultError, choice_of
-from sprag.service.http.access import COOKIE
-from sprag.service.http.context import Context, Ctx
-from sprag.service.http.current import current
-from sprag.service.http.language import PARAMETER, keep_language
-from sprag.service.http.people import Action, Actor, Since, Target, Until, user_json
-from sprag.service.http.reading import PageChoice, keep, keep_zone
-from sprag.service.http.routers import page_router
-from sprag.service.http.web.form.values import Form
-from sprag.service.http.web.templates import page
-from sprag.service.http.web.way_in import access_of, within
-from sprag.service.jobs.maintenance import backups
-from sprag.service.jobs.workers import worker_list
-from sprag.service.languages import N_
-from sprag.service.reading.faults import message
-from sprag.service.reading.quantities import KINDS, SI, TYPED, WORKSHOP, read_units
-from sprag.service.reading.reader import CAPTIONS, CODES, Choice
-from sprag.service.storage.people.audit import AuditPage, audit_filter
-from sprag.service.zones import is_zone, zones
+from sprag_study.service import languages
+from sprag_study.service.exports.audit import entry_json
+from sprag_study.service.faults import FaultError, choice_of
+from sprag_study.service.http.access import COOKIE
+from sprag_study.service.http.context import Context, Ctx
+from sprag_study.service.http.current import current
+from sprag_study.service.http.language import PARAMETER, keep_language
+from sprag_study.service.http.people import Action, Actor, Since, Target, Until, user_json
+from sprag_study.service.http.reading import PageChoice, keep, keep_zone
+from sprag_study.service.http.routers import page_router
+from sprag_study.service.http.web.form.values import Form
+from sprag_study.service.http.web.templates import page
+from sprag_study.service.http.web.way_in import access_of, within
+from sprag_study.service.jobs.maintenance import backups
+from sprag_study.service.jobs.workers import worker_list
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.faults import message
+from sprag_study.service.reading.quantities import KINDS, SI, TYPED, WORKSHOP, read_units
+from sprag_study.service.reading.reader import CAPTIONS, CODES, Choice
+from sprag_study.service.storage.people.audit import AuditPage, audit_filter
+from sprag_study.service.zones import is_zone, zones
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
     from datetime import datetime
 
-    from sprag.service.storage.people.people import TokenRecord, UserRecord
-    from sprag.service.storage.people.scopes import TokenState
+    from sprag_study.service.storage.people.people import TokenRecord, UserRecord
+    from sprag_study.service.storage.people.scopes import TokenState
 
 router = page_router()
 

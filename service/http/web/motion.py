@@ -10,56 +10,56 @@ from urllib.parse import urlencode
 from fastapi import Query, Request
 from starlette.responses import RedirectResponse, Response
 
-from sprag.sentences import Part, Sentence, Whole
-from sprag.service.faults import FaultError
-from sprag.service.figures.drawings import drawings
-from sprag.service.figures.read import read_figure
-from sprag.service.figures.svg import NARROW, WIDE, picture_svg
-from sprag.service.http.context import CaseNumber, StartNumber, StudyId, study_with
-from sprag.service.http.drawing import picture, unchanging
-from sprag.service.http.language import language_pairs
-from sprag.service.http.problems import ApiError, api_error
-from sprag.service.http.reading import FileChoice
-from sprag.service.http.routers import page_router
-from sprag.service.http.threads import in_thread
-from sprag.service.http.views import study_address
-from sprag.service.http.web.figures.drawn import cases_of
-from sprag.service.http.web.figures.live import frames
-from sprag.service.http.web.study import study_frame
-from sprag.service.http.web.templates import page, spec_text
-from sprag.service.http.web.view_forms import Asked, Seen, asked_of, fact_of, files_of, inline
-from sprag.service.http.work import Attended
-from sprag.service.languages import _
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.reader import Phrase, joined, meanings
-from sprag.service.results.defaults import main_results
-from sprag.service.results.headlines.along import told
-from sprag.service.results.headlines.headline import MOST, NOTHING, KeyNumber, amount, digits
-from sprag.service.results.regimes import ORDER, coasting_sentence, motion_sentence
-from sprag.service.results.selection import axis_name, own_paths
-from sprag.service.results.start_states import check_start
-from sprag.service.results.sweeps import direction_texts
-from sprag.service.spec.design import design_spec
-from sprag.service.views.case_view import see
-from sprag.service.views.cases import CASE_VIEWS
-from sprag.service.views.library import reading_of
-from sprag.service.views.shown import NOTHING as NOTHING_MORE
-from sprag.service.views.trajectory import PhasesView
-from sprag.worker import models
-from sprag.worker.models.starts import motion_of
+from sprag_study.sentences import Part, Sentence, Whole
+from sprag_study.service.faults import FaultError
+from sprag_study.service.figures.drawings import drawings
+from sprag_study.service.figures.read import read_figure
+from sprag_study.service.figures.svg import NARROW, WIDE, picture_svg
+from sprag_study.service.http.context import CaseNumber, StartNumber, StudyId, study_with
+from sprag_study.service.http.drawing import picture, unchanging
+from sprag_study.service.http.language import language_pairs
+from sprag_study.service.http.problems import ApiError, api_error
+from sprag_study.service.http.reading import FileChoice
+from sprag_study.service.http.routers import page_router
+from sprag_study.service.http.threads import in_thread
+from sprag_study.service.http.views import study_address
+from sprag_study.service.http.web.figures.drawn import cases_of
+from sprag_study.service.http.web.figures.live import frames
+from sprag_study.service.http.web.study import study_frame
+from sprag_study.service.http.web.templates import page, spec_text
+from sprag_study.service.http.web.view_forms import Asked, Seen, asked_of, fact_of, files_of, inline
+from sprag_study.service.http.work import Attended
+from sprag_study.service.languages import _
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.reader import Phrase, joined, meanings
+from sprag_study.service.results.defaults import main_results
+from sprag_study.service.results.headlines.along import told
+from sprag_study.service.results.headlines.headline import MOST, NOTHING, KeyNumber, amount, digits
+from sprag_study.service.results.regimes import ORDER, coasting_sentence, motion_sentence
+from sprag_study.service.results.selection import axis_name, own_paths
+from sprag_study.service.results.start_states import check_start
+from sprag_study.service.results.sweeps import direction_texts
+from sprag_study.service.spec.design import design_spec
+from sprag_study.service.views.case_view import see
+from sprag_study.service.views.cases import CASE_VIEWS
+from sprag_study.service.views.library import reading_of
+from sprag_study.service.views.shown import NOTHING as NOTHING_MORE
+from sprag_study.service.views.trajectory import PhasesView
+from sprag_study.worker import models
+from sprag_study.worker.models.starts import motion_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from starlette.datastructures import QueryParams
 
-    from sprag.service.http.context import Context
-    from sprag.service.http.work import Work
-    from sprag.service.reading.reader import Reading
-    from sprag.service.storage.studies.records import CaseRow
-    from sprag.service.views.case_view import CaseAnswer, CaseView
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.study import Study
+    from sprag_study.service.http.context import Context
+    from sprag_study.service.http.work import Work
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.service.storage.studies.records import CaseRow
+    from sprag_study.service.views.case_view import CaseAnswer, CaseView
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.study import Study
 
 router = page_router()
 

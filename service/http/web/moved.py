@@ -7,8 +7,8 @@ from typing import Final
 from fastapi import Request
 from starlette.responses import RedirectResponse, Response
 
-from sprag.service.http.context import CaseNumber, StudyId
-from sprag.service.http.routers import page_router
+from sprag_study.service.http.context import CaseNumber, StudyId
+from sprag_study.service.http.routers import page_router
 
 router = page_router()
 

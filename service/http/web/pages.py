@@ -9,17 +9,17 @@ from fastapi import Request
 from starlette.responses import RedirectResponse, Response
 from starlette.staticfiles import StaticFiles
 
-from sprag.sentences import Sentence
-from sprag.service.http.prefix import here
-from sprag.service.http.problems import PROBLEM_TYPES, ApiError
-from sprag.service.http.respond import json_response
-from sprag.service.http.routers import page_router
-from sprag.service.http.threads import in_thread
-from sprag.service.http.web import apidoc
-from sprag.service.http.web.apidoc import with_token_needed
-from sprag.service.http.web.manual import PAGES, manual_page, titles
-from sprag.service.http.web.templates import page
-from sprag.service.reading.quantities import KINDS
+from sprag_study.sentences import Sentence
+from sprag_study.service.http.prefix import here
+from sprag_study.service.http.problems import PROBLEM_TYPES, ApiError
+from sprag_study.service.http.respond import json_response
+from sprag_study.service.http.routers import page_router
+from sprag_study.service.http.threads import in_thread
+from sprag_study.service.http.web import apidoc
+from sprag_study.service.http.web.apidoc import with_token_needed
+from sprag_study.service.http.web.manual import PAGES, manual_page, titles
+from sprag_study.service.http.web.templates import page
+from sprag_study.service.reading.quantities import KINDS
 
 if TYPE_CHECKING:
     from starlette.types import Receive, Scope, Send
@@ -104,7 +104,7 @@ class _Files(StaticFiles):
         return response
 
 
-_FILES: Final = _Files(packages=[("sprag.service.http.web", "static"), ("sprag.service.report", "static")])
+_FILES: Final = _Files(packages=[("sprag_study.service.http.web", "static"), ("sprag_study.service.report", "static")])
 
 
 class _SiteFiles(StaticFiles):

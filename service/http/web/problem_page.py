@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag.service.http.web.templates import page
+from sprag_study.service.http.web.templates import page
 
 if TYPE_CHECKING:
     from starlette.requests import Request
     from starlette.responses import Response
 
-    from sprag.service.http.problems import ApiError
+    from sprag_study.service.http.problems import ApiError
 
 _API = "/api/"
 

@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Any, Final
 
 from starlette.responses import RedirectResponse, Response
 
-from sprag.service.faults import choice_of
-from sprag.service.http.context import Context, Ctx
-from sprag.service.http.reading import page_query
-from sprag.service.http.routers import page_router
-from sprag.service.http.web.form.values import Form
-from sprag.service.jobs.saved_views import change_view, save_view
-from sprag.service.languages import N_, _
-from sprag.service.spec.saved_views import FIGURES, read_view, read_view_change
-from sprag.worker.limits import MAX_NAME_LENGTH, MAX_REPORT_FIGURES
+from sprag_study.service.faults import choice_of
+from sprag_study.service.http.context import Context, Ctx
+from sprag_study.service.http.reading import page_query
+from sprag_study.service.http.routers import page_router
+from sprag_study.service.http.web.form.values import Form
+from sprag_study.service.jobs.saved_views import change_view, save_view
+from sprag_study.service.languages import N_, _
+from sprag_study.service.spec.saved_views import FIGURES, read_view, read_view_change
+from sprag_study.worker.limits import MAX_NAME_LENGTH, MAX_REPORT_FIGURES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from sprag.service.storage.saved_views import SavedView
+    from sprag_study.service.storage.saved_views import SavedView
 
 router = page_router()
 

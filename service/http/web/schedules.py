@@ -13,35 +13,35 @@ from zoneinfo import ZoneInfo
 from fastapi import Query
 from starlette.responses import RedirectResponse, Response
 
-from sprag.sentences import Sentence
-from sprag.service.faults import Fault
-from sprag.service.http.context import Context, Ctx
-from sprag.service.http.current import current
-from sprag.service.http.problems import ApiError
-from sprag.service.http.routers import page_router
-from sprag.service.http.schedule_views import listed
-from sprag.service.http.threads import in_thread
-from sprag.service.http.views import preset_of
-from sprag.service.http.web.form.entries import Values
-from sprag.service.http.web.form.values import Form, changed_meanwhile
-from sprag.service.http.web.templates import page
-from sprag.service.http.work import Attended, Work
-from sprag.service.jobs import checks
-from sprag.service.jobs.nights import HOURS, MOST_HOURS, night
-from sprag.service.languages import N_, gettext
-from sprag.service.presets import preset_names
-from sprag.service.reading.faults import allowed_text, fault_text
-from sprag.service.reading.reader import meanings
-from sprag.service.schedules.fields import AT_ALLOWED, CRON_ALLOWED, ScheduleFields, change_fields
-from sprag.service.schedules.plain import DAYS, cron_of, days_of, deadline_said, said
-from sprag.service.schedules.report_to import require_deliverable
-from sprag.service.schedules.trouble import usual_flags
-from sprag.service.spec.report import SpecError
-from sprag.service.spec.stored import accepted
-from sprag.service.storage.errors import ChangedMeanwhileError, StudyNotFoundError, TooManySchedulesError
-from sprag.service.zones import zones
-from sprag.worker import models
-from sprag.worker.limits import MAX_PRIORITY
+from sprag_study.sentences import Sentence
+from sprag_study.service.faults import Fault
+from sprag_study.service.http.context import Context, Ctx
+from sprag_study.service.http.current import current
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.http.routers import page_router
+from sprag_study.service.http.schedule_views import listed
+from sprag_study.service.http.threads import in_thread
+from sprag_study.service.http.views import preset_of
+from sprag_study.service.http.web.form.entries import Values
+from sprag_study.service.http.web.form.values import Form, changed_meanwhile
+from sprag_study.service.http.web.templates import page
+from sprag_study.service.http.work import Attended, Work
+from sprag_study.service.jobs import checks
+from sprag_study.service.jobs.nights import HOURS, MOST_HOURS, night
+from sprag_study.service.languages import N_, gettext
+from sprag_study.service.presets import preset_names
+from sprag_study.service.reading.faults import allowed_text, fault_text
+from sprag_study.service.reading.reader import meanings
+from sprag_study.service.schedules.fields import AT_ALLOWED, CRON_ALLOWED, ScheduleFields, change_fields
+from sprag_study.service.schedules.plain import DAYS, cron_of, days_of, deadline_said, said
+from sprag_study.service.schedules.report_to import require_deliverable
+from sprag_study.service.schedules.trouble import usual_flags
+from sprag_study.service.spec.report import SpecError
+from sprag_study.service.spec.stored import accepted
+from sprag_study.service.storage.errors import ChangedMeanwhileError, StudyNotFoundError, TooManySchedulesError
+from sprag_study.service.zones import zones
+from sprag_study.worker import models
+from sprag_study.worker.limits import MAX_PRIORITY
 
 router = page_router()
 

@@ -10,7 +10,7 @@ from typing import Final
 
 from markupsafe import Markup
 
-from sprag.service import languages
+from sprag_study.service import languages
 
 _FOLDER: Final = Path(__file__).parent / "static"
 _TEXT: Final = re.compile(r'\bsprag\.say\(\s*("(?:[^"\\\n]|\\.)*")')

@@ -8,51 +8,51 @@ from typing import TYPE_CHECKING, Any, Final
 from fastapi import Request
 from starlette.responses import RedirectResponse, Response
 
-from sprag.sentences import Sentence
-from sprag.service import formats
-from sprag.service.http import views
-from sprag.service.http.context import Context, Ctx, StudyId
-from sprag.service.http.current import current
-from sprag.service.http.prefix import here
-from sprag.service.http.problems import ApiError
-from sprag.service.http.routers import page_router
-from sprag.service.http.threads import in_thread
-from sprag.service.http.web.figures.fits import fits_of, has_measured_clutch
-from sprag.service.http.web.form.values import changed_meanwhile
-from sprag.service.http.web.saved_views import saved_here, view_actions
-from sprag.service.http.web.sheet.chart import has_chart
-from sprag.service.http.web.sheet.drawer import drawer_of, map_pairs, with_query
-from sprag.service.http.web.sheet.side import trust_of
-from sprag.service.http.web.sheet.view import sheet_of
-from sprag.service.http.web.templates import page
-from sprag.service.http.work import Attended, Work
-from sprag.service.jobs import checks
-from sprag.service.jobs.submission import take_in
-from sprag.service.json_text import timestamp
-from sprag.service.languages import N_
-from sprag.service.reading.directions import ends_in_words
-from sprag.service.reading.part_names import part_name
-from sprag.service.reading.reader import meanings, reading_for
-from sprag.service.results.defaults import no_curves
-from sprag.service.results.regimes import DOUBTFUL
-from sprag.service.results.shown_inputs import inputs, run_settings, varying
-from sprag.service.spec.narrow import narrowed_cases
-from sprag.service.storage.studies.records import Kinds
-from sprag.service.views.headline import is_small
-from sprag.worker import models
-from sprag.worker.limits import MAX_CASES, NARROW_STEPS
-from sprag.worker.states import TRANSITIONS, StudyEvent, StudyState
+from sprag_study.sentences import Sentence
+from sprag_study.service import formats
+from sprag_study.service.http import views
+from sprag_study.service.http.context import Context, Ctx, StudyId
+from sprag_study.service.http.current import current
+from sprag_study.service.http.prefix import here
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.http.routers import page_router
+from sprag_study.service.http.threads import in_thread
+from sprag_study.service.http.web.figures.fits import fits_of, has_measured_clutch
+from sprag_study.service.http.web.form.values import changed_meanwhile
+from sprag_study.service.http.web.saved_views import saved_here, view_actions
+from sprag_study.service.http.web.sheet.chart import has_chart
+from sprag_study.service.http.web.sheet.drawer import drawer_of, map_pairs, with_query
+from sprag_study.service.http.web.sheet.side import trust_of
+from sprag_study.service.http.web.sheet.view import sheet_of
+from sprag_study.service.http.web.templates import page
+from sprag_study.service.http.work import Attended, Work
+from sprag_study.service.jobs import checks
+from sprag_study.service.jobs.submission import take_in
+from sprag_study.service.json_text import timestamp
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.directions import ends_in_words
+from sprag_study.service.reading.part_names import part_name
+from sprag_study.service.reading.reader import meanings, reading_for
+from sprag_study.service.results.defaults import no_curves
+from sprag_study.service.results.regimes import DOUBTFUL
+from sprag_study.service.results.shown_inputs import inputs, run_settings, varying
+from sprag_study.service.spec.narrow import narrowed_cases
+from sprag_study.service.storage.studies.records import Kinds
+from sprag_study.service.views.headline import is_small
+from sprag_study.worker import models
+from sprag_study.worker.limits import MAX_CASES, NARROW_STEPS
+from sprag_study.worker.states import TRANSITIONS, StudyEvent, StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from starlette.datastructures import QueryParams
 
-    from sprag.service.answers.studies import ClutchFitReport
-    from sprag.service.http.web.figures.fit import FitChart
-    from sprag.service.http.web.form.entries import Faults, Values
-    from sprag.service.http.web.sheet.view import Sheet
-    from sprag.worker.study import Study
+    from sprag_study.service.answers.studies import ClutchFitReport
+    from sprag_study.service.http.web.figures.fit import FitChart
+    from sprag_study.service.http.web.form.entries import Faults, Values
+    from sprag_study.service.http.web.sheet.view import Sheet
+    from sprag_study.worker.study import Study
 
 router = page_router()
 

@@ -13,37 +13,37 @@ from markupsafe import Markup
 from starlette.datastructures import QueryParams
 from starlette.responses import RedirectResponse, Response
 
-from sprag.service.answers.studies import StudyOrder
-from sprag.service.faults import FaultError, choice_of
-from sprag.service.figures.figure import Line
-from sprag.service.figures.svg import spark
-from sprag.service.http import views
-from sprag.service.http.context import Context, Ctx, StudyId
-from sprag.service.http.current import current
-from sprag.service.http.listing import wanted_studies
-from sprag.service.http.routers import page_router
-from sprag.service.http.threads import in_thread
-from sprag.service.http.views import preset_of
-from sprag.service.http.web import saved_views
-from sprag.service.http.web.form.entries import Faults
-from sprag.service.http.web.form.values import Form, RepeatedForm
-from sprag.service.http.web.study import shown_study
-from sprag.service.http.web.templates import page
-from sprag.service.http.work import Attended
-from sprag.service.languages import N_, _
-from sprag.service.presets import preset_names
-from sprag.service.reading.faults import message
-from sprag.service.results.headlines.headline import short_titles
-from sprag.service.spec.labels import StudyChange, read_change, tags_of
-from sprag.service.spec.report import SpecError
-from sprag.service.storage.errors import ChangedMeanwhileError, StoreError
-from sprag.service.storage.studies.listing import StudyFilter
-from sprag.service.storage.studies.records import StudyPage, StudyRecord
-from sprag.service.views.listed import ANSWERS, Listed
-from sprag.service.views.listed import listed as answers
-from sprag.worker import models
-from sprag.worker.limits import MAX_PAGE_TOKEN, MAX_SEARCH_LENGTH
-from sprag.worker.states import StudyState
+from sprag_study.service.answers.studies import StudyOrder
+from sprag_study.service.faults import FaultError, choice_of
+from sprag_study.service.figures.figure import Line
+from sprag_study.service.figures.svg import spark
+from sprag_study.service.http import views
+from sprag_study.service.http.context import Context, Ctx, StudyId
+from sprag_study.service.http.current import current
+from sprag_study.service.http.listing import wanted_studies
+from sprag_study.service.http.routers import page_router
+from sprag_study.service.http.threads import in_thread
+from sprag_study.service.http.views import preset_of
+from sprag_study.service.http.web import saved_views
+from sprag_study.service.http.web.form.entries import Faults
+from sprag_study.service.http.web.form.values import Form, RepeatedForm
+from sprag_study.service.http.web.study import shown_study
+from sprag_study.service.http.web.templates import page
+from sprag_study.service.http.work import Attended
+from sprag_study.service.languages import N_, _
+from sprag_study.service.presets import preset_names
+from sprag_study.service.reading.faults import message
+from sprag_study.service.results.headlines.headline import short_titles
+from sprag_study.service.spec.labels import StudyChange, read_change, tags_of
+from sprag_study.service.spec.report import SpecError
+from sprag_study.service.storage.errors import ChangedMeanwhileError, StoreError
+from sprag_study.service.storage.studies.listing import StudyFilter
+from sprag_study.service.storage.studies.records import StudyPage, StudyRecord
+from sprag_study.service.views.listed import ANSWERS, Listed
+from sprag_study.service.views.listed import listed as answers
+from sprag_study.worker import models
+from sprag_study.worker.limits import MAX_PAGE_TOKEN, MAX_SEARCH_LENGTH
+from sprag_study.worker.states import StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -16,24 +16,24 @@ from jinja2.runtime import Context
 from markupsafe import Markup, escape
 from starlette.responses import Response
 
-from sprag.sentences import Sentence, WarningText
-from sprag.service import languages
-from sprag.service.actor import Role
-from sprag.service.figures.drawing import Drawing
-from sprag.service.figures.drawing import svg as drawing_svg
-from sprag.service.http.current import current
-from sprag.service.http.prefix import here
-from sprag.service.http.reading import file_read_as
-from sprag.service.http.web.explained import explained
-from sprag.service.http.web.script_texts import translated_texts
-from sprag.service.languages import N_
-from sprag.service.reading import times
-from sprag.service.reading.faults import allowed_text, fault_text, value_text
-from sprag.service.reading.quantities import KINDS, SI, TYPED, WORKSHOP, read_units
-from sprag.service.reading.reader import CLUTCH, Reading, model_title, shown, titled, told, word
-from sprag.service.reading.wording import counted, duration, number, symbol, typed_text, unit_text
-from sprag.service.report.html import embedded, sheet_of
-from sprag.worker import models
+from sprag_study.sentences import Sentence, WarningText
+from sprag_study.service import languages
+from sprag_study.service.actor import Role
+from sprag_study.service.figures.drawing import Drawing
+from sprag_study.service.figures.drawing import svg as drawing_svg
+from sprag_study.service.http.current import current
+from sprag_study.service.http.prefix import here
+from sprag_study.service.http.reading import file_read_as
+from sprag_study.service.http.web.explained import explained
+from sprag_study.service.http.web.script_texts import translated_texts
+from sprag_study.service.languages import N_
+from sprag_study.service.reading import times
+from sprag_study.service.reading.faults import allowed_text, fault_text, value_text
+from sprag_study.service.reading.quantities import KINDS, SI, TYPED, WORKSHOP, read_units
+from sprag_study.service.reading.reader import CLUTCH, Reading, model_title, shown, titled, told, word
+from sprag_study.service.reading.wording import counted, duration, number, symbol, typed_text, unit_text
+from sprag_study.service.report.html import embedded, sheet_of
+from sprag_study.worker import models
 
 #: The beginning of an attribute that is an address: a path of this service, or an expression that may give one.
 _ADDRESS = re.compile(
@@ -48,7 +48,7 @@ _TRANSLATED: Final = re.compile(r"(\{%-? *trans\b.*?\{%-? *endtrans *-?%\})", re
 
 
 class Addresses(Extension):
-    """Adds the URL prefix of the service (`sprag.service.http.prefix`) to every address in a page."""
+    """Adds the URL prefix of the service (`sprag_study.service.http.prefix`) to every address in a page."""
 
     def preprocess(self, source: str, name: str | None, filename: str | None = None) -> str:  # noqa: ARG002
         """The template with ``here`` where an address begins."""
@@ -109,7 +109,9 @@ def _warning(text: str, reading: Reading) -> str:
 def _templates() -> Environment:
     environment = Environment(
         # The sheets of a document are those of its files.
-        loader=ChoiceLoader([PackageLoader("sprag.service.http.web"), PackageLoader("sprag.service.report")]),
+        loader=ChoiceLoader(
+            [PackageLoader("sprag_study.service.http.web"), PackageLoader("sprag_study.service.report")]
+        ),
         autoescape=True,
         extensions=[Addresses, "jinja2.ext.i18n"],
         undefined=StrictUndefined,

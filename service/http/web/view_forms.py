@@ -1,6 +1,7 @@
 """Views on pages: what is asked of one as a form, its figure, and what people read beside it.
 
-The form is made of the settings of the view's question (`sprag.service.views.setting`), for cases and for studies.
+The form is made of the settings of the view's question (`sprag_study.service.views.setting`), for cases and for
+studies.
 """
 
 from __future__ import annotations
@@ -12,20 +13,20 @@ from urllib.parse import urlencode
 
 from markupsafe import Markup
 
-from sprag.service.faults import Fault, FaultError
-from sprag.service.figures.pictures import PICTURES
-from sprag.service.figures.read import read_figure
-from sprag.service.http.web.figures.drawn import drawn
-from sprag.service.languages import gettext
-from sprag.service.views.setting import NamedSetting, Offered, ViewInfo, question_of, settings_of
-from sprag.service.views.shown import NOTHING, Shown
+from sprag_study.service.faults import Fault, FaultError
+from sprag_study.service.figures.pictures import PICTURES
+from sprag_study.service.figures.read import read_figure
+from sprag_study.service.http.web.figures.drawn import drawn
+from sprag_study.service.languages import gettext
+from sprag_study.service.views.setting import NamedSetting, Offered, ViewInfo, question_of, settings_of
+from sprag_study.service.views.shown import NOTHING, Shown
 
 if TYPE_CHECKING:
     from starlette.datastructures import QueryParams
 
-    from sprag.service.figures.figure import Figure
-    from sprag.service.reading.reader import Reading
-    from sprag.service.results.headlines.headline import KeyNumber
+    from sprag_study.service.figures.figure import Figure
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.service.results.headlines.headline import KeyNumber
 
 #: No figure.
 EMPTY: Final = Markup()

@@ -12,18 +12,18 @@ from urllib.parse import quote, urlsplit
 
 from starlette.responses import RedirectResponse
 
-from sprag.service.http.access import COOKIE, Access, Grant
-from sprag.service.http.web.form.values import read_form
-from sprag.service.http.web.problem_page import wants_page
-from sprag.service.http.web.templates import page
-from sprag.service.reading.reader import told
+from sprag_study.service.http.access import COOKIE, Access, Grant
+from sprag_study.service.http.web.form.values import read_form
+from sprag_study.service.http.web.problem_page import wants_page
+from sprag_study.service.http.web.templates import page
+from sprag_study.service.reading.reader import told
 
 if TYPE_CHECKING:
     from starlette.requests import Request
     from starlette.responses import Response
 
-    from sprag.service.http.problems import ApiError
-    from sprag.service.http.web.form.entries import Values
+    from sprag_study.service.http.problems import ApiError
+    from sprag_study.service.http.web.form.entries import Values
 
 LOGIN_PATH: Final = "/login"
 #: Field of the login that states that a form is sent afterwards, and the prefix of the names of its fields.

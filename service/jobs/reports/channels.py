@@ -15,15 +15,15 @@ import time
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.delivery import origin_of
-from sprag.service.schedules.report_to import mail_allowed
+from sprag_study.service.delivery import origin_of
+from sprag_study.service.schedules.report_to import mail_allowed
 
 if TYPE_CHECKING:
     from datetime import datetime
     from email.message import EmailMessage
 
-    from sprag.service.delivery import Delivery, MailServer
-    from sprag.service.storage.schedules.reports import Claimed
+    from sprag_study.service.delivery import Delivery, MailServer
+    from sprag_study.service.storage.schedules.reports import Claimed
 
 #: Seconds for each step of sending.
 TIMEOUT: Final = 30.0

@@ -6,15 +6,15 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from sprag.service.figures.pictures import draw_curves
-from sprag.service.reading.reader import Choice, reading_for
-from sprag.service.report.chosen_figures import chosen_figures
-from sprag.service.results.curve_cases import draw, select
-from sprag.service.results.defaults import main_query
-from sprag.worker import models
+from sprag_study.service.figures.pictures import draw_curves
+from sprag_study.service.reading.reader import Choice, reading_for
+from sprag_study.service.report.chosen_figures import chosen_figures
+from sprag_study.service.results.curve_cases import draw, select
+from sprag_study.service.results.defaults import main_query
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
-    from sprag.service.storage.store import Store
+    from sprag_study.service.storage.store import Store
 
 
 def small_curve(store: Store, study_id: str, units: str) -> bytes | None:

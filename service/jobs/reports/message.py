@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from sprag.sentences import sentence_of
-from sprag.service.json_text import timestamp, to_bytes
-from sprag.service.languages import ENGLISH, N_, _, current, grouped, language, ngettext
-from sprag.service.reading.reader import shown, term, told
-from sprag.service.schedules.outcomes import Outcome
-from sprag.service.schedules.times import wall_clock
+from sprag_study.sentences import sentence_of
+from sprag_study.service.json_text import timestamp, to_bytes
+from sprag_study.service.languages import ENGLISH, N_, _, current, grouped, language, ngettext
+from sprag_study.service.reading.reader import shown, term, told
+from sprag_study.service.schedules.outcomes import Outcome
+from sprag_study.service.schedules.times import wall_clock
 
 if TYPE_CHECKING:
-    from sprag.service.delivery import Delivery
-    from sprag.service.storage.schedules.reports import Claimed
+    from sprag_study.service.delivery import Delivery
+    from sprag_study.service.storage.schedules.reports import Claimed
 
 _CURVE: Final = "curve"
 #: What the addresses of `links` lead to.
@@ -156,7 +156,7 @@ def webhook_body(report: Claimed, delivery: Delivery) -> bytes:
 @lru_cache(maxsize=1)
 def _template() -> Any:
     environment = Environment(
-        loader=PackageLoader("sprag.service.jobs.reports"),
+        loader=PackageLoader("sprag_study.service.jobs.reports"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

@@ -7,18 +7,18 @@ import socket
 from datetime import timedelta
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.actor import Actor, Door, act_as
-from sprag.service.jobs.polling import PollingThread
-from sprag.service.jobs.reports.channels import DeliveryError, send_mail, send_webhook
-from sprag.service.jobs.reports.message import mail, webhook_body
-from sprag.service.languages import language
+from sprag_study.service.actor import Actor, Door, act_as
+from sprag_study.service.jobs.polling import PollingThread
+from sprag_study.service.jobs.reports.channels import DeliveryError, send_mail, send_webhook
+from sprag_study.service.jobs.reports.message import mail, webhook_body
+from sprag_study.service.languages import language
 
 if TYPE_CHECKING:
     import ssl
 
-    from sprag.service.delivery import Delivery
-    from sprag.service.storage.schedules.reports import Claimed
-    from sprag.service.storage.store import Store
+    from sprag_study.service.delivery import Delivery
+    from sprag_study.service.storage.schedules.reports import Claimed
+    from sprag_study.service.storage.store import Store
 
 _LOG = logging.getLogger("sprag.reports")
 
@@ -84,7 +84,7 @@ class Reporter(PollingThread):
         study, outcome = report.content.get("study"), report.content.get("outcome")
         if study is None or outcome is None or not outcome["ok"]:
             return None
-        from sprag.service.jobs.reports.curve import small_curve
+        from sprag_study.service.jobs.reports.curve import small_curve
 
         try:
             with language(self._delivery.language):

@@ -7,18 +7,18 @@ from dataclasses import dataclass
 from datetime import timedelta
 from typing import TYPE_CHECKING, Final
 
-from sprag.sentences import Clause, Sentence
-from sprag.service.answers import filled
-from sprag.service.answers.schedules import LateRun as LateRunAnswer
-from sprag.service.languages import recorded
-from sprag.service.languages.earlier import sentence_in
-from sprag.service.schedules.times import local_time, wall_clock
+from sprag_study.sentences import Clause, Sentence
+from sprag_study.service.answers import filled
+from sprag_study.service.answers.schedules import LateRun as LateRunAnswer
+from sprag_study.service.languages import recorded
+from sprag_study.service.languages.earlier import sentence_in
+from sprag_study.service.schedules.times import local_time, wall_clock
 
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from sprag.service.storage.schedules.runs import ExpectedRun
-    from sprag.service.storage.store import Store
+    from sprag_study.service.storage.schedules.runs import ExpectedRun
+    from sprag_study.service.storage.store import Store
 
 _LOG = logging.getLogger("sprag.watchdog")
 

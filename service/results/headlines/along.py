@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import Amount, Name, Whole
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.reader import Phrase, joined, term
-from sprag.service.results.headlines.headline import (
+from sprag_study.sentences import Amount, Name, Whole
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.reader import Phrase, joined, term
+from sprag_study.service.results.headlines.headline import (
     MOST,
     NOTHING,
     Gap,
@@ -21,23 +21,23 @@ from sprag.service.results.headlines.headline import (
     digits,
     trace_of,
 )
-from sprag.service.results.key_answer_words import answer_facts, curve_name, curve_named, note_of, place_text
-from sprag.service.results.key_answers import OF_PLACES, answers_at, usual_curve
-from sprag.service.results.selection import axis_name
-from sprag.worker import models
-from sprag.worker.directions import SWEEP, direction
-from sprag.worker.models import NO_PARAMETERS
-from sprag.worker.study import SAME_VALUE
+from sprag_study.service.results.key_answer_words import answer_facts, curve_name, curve_named, note_of, place_text
+from sprag_study.service.results.key_answers import OF_PLACES, answers_at, usual_curve
+from sprag_study.service.results.selection import axis_name
+from sprag_study.worker import models
+from sprag_study.worker.directions import SWEEP, direction
+from sprag_study.worker.models import NO_PARAMETERS
+from sprag_study.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from sprag.sentences import Part
-    from sprag.service.results.curves import Curve
-    from sprag.service.results.key_answers import CurveAnswers, Found, StudyAnswers
-    from sprag.service.results.refined import Line
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.study import Study
+    from sprag_study.sentences import Part
+    from sprag_study.service.results.curves import Curve
+    from sprag_study.service.results.key_answers import CurveAnswers, Found, StudyAnswers
+    from sprag_study.service.results.refined import Line
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.study import Study
 
 #: What is less than this share of its neighbour is worth a sentence.
 _LEFT: Final = 0.5

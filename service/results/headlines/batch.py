@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import Amount, Name, Whole
-from sprag.service.reading.reader import Phrase, joined
-from sprag.service.results.defaults import drawn_results, usual_value
-from sprag.service.results.headlines.along import curve_of, judged_by
-from sprag.service.results.headlines.headline import (
+from sprag_study.sentences import Amount, Name, Whole
+from sprag_study.service.reading.reader import Phrase, joined
+from sprag_study.service.results.defaults import drawn_results, usual_value
+from sprag_study.service.results.headlines.along import curve_of, judged_by
+from sprag_study.service.results.headlines.headline import (
     NOTHING,
     Gap,
     Headline,
@@ -22,25 +22,25 @@ from sprag.service.results.headlines.headline import (
     digits,
     trace_of,
 )
-from sprag.service.results.key_answers import OF_PLACES, from_base, place_of
-from sprag.service.results.tolerances.batch import Asked
-from sprag.service.results.tolerances.conditions import first_condition
-from sprag.service.results.tolerances.ribbons import QUANTILES, ribbon
-from sprag.service.results.tolerances.yields import yields
-from sprag.worker import models
-from sprag.worker.spread import DRIVE
-from sprag.worker.study import SAME_VALUE
+from sprag_study.service.results.key_answers import OF_PLACES, from_base, place_of
+from sprag_study.service.results.tolerances.batch import Asked
+from sprag_study.service.results.tolerances.conditions import first_condition
+from sprag_study.service.results.tolerances.ribbons import QUANTILES, ribbon
+from sprag_study.service.results.tolerances.yields import yields
+from sprag_study.worker import models
+from sprag_study.worker.spread import DRIVE
+from sprag_study.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.results.curves import CurveQuery, Fetch
-    from sprag.service.results.refined import Line
-    from sprag.service.results.tolerances.batch import Places
-    from sprag.service.results.tolerances.ribbons import Ribbon, RibbonLine
-    from sprag.service.results.tolerances.yields import Yield, YieldLine
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.study import Study
+    from sprag_study.service.results.curves import CurveQuery, Fetch
+    from sprag_study.service.results.refined import Line
+    from sprag_study.service.results.tolerances.batch import Places
+    from sprag_study.service.results.tolerances.ribbons import Ribbon, RibbonLine
+    from sprag_study.service.results.tolerances.yields import Yield, YieldLine
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.study import Study
 
 _YIELD: Final = Phrase("Yield")
 _LOW, _MIDDLE, _HIGH = range(len(QUANTILES))

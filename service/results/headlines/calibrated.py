@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag.sentences import Amount, Name
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.reader import Phrase, joined, plural
-from sprag.service.results.headlines.headline import MOST, NOTHING, Headline, KeyNumber, digits
+from sprag_study.sentences import Amount, Name
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.reader import Phrase, joined, plural
+from sprag_study.service.results.headlines.headline import MOST, NOTHING, Headline, KeyNumber, digits
 
 if TYPE_CHECKING:
-    from sprag.service.results.calibration import Calibration
+    from sprag_study.service.results.calibration import Calibration
 
 
 def calibrated_headline(found: Calibration) -> Headline:

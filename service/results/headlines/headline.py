@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import Amount, Name
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.reader import Phrase
-from sprag.service.reading.wording import number, unit_text
-from sprag.service.results.key_answers import OF_PLACES
+from sprag_study.sentences import Amount, Name
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.reader import Phrase
+from sprag_study.service.reading.wording import number, unit_text
+from sprag_study.service.results.key_answers import OF_PLACES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from sprag.service.reading.reader import Reading
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.models.presentation import Better
-    from sprag.worker.study import Study
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.models.presentation import Better
+    from sprag_study.worker.study import Study
 
 #: Key numbers at most.
 MOST: Final = 4

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag.sentences import Amount, Name, Part
-from sprag.service.languages import N_
-from sprag.service.reading.reader import Phrase, joined
-from sprag.service.results.headlines.headline import MOST, NOTHING, Headline, KeyNumber, digits
-from sprag.service.results.sensitivity import in_order, per_tenth, weight
+from sprag_study.sentences import Amount, Name, Part
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.reader import Phrase, joined
+from sprag_study.service.results.headlines.headline import MOST, NOTHING, Headline, KeyNumber, digits
+from sprag_study.service.results.sensitivity import in_order, per_tenth, weight
 
 if TYPE_CHECKING:
-    from sprag.service.results.sensitivity import Effect, Sensitivity
-    from sprag.worker.study import Study
+    from sprag_study.service.results.sensitivity import Effect, Sensitivity
+    from sprag_study.worker.study import Study
 
 
 def influence_headline(study: Study, item: Sensitivity) -> Headline:

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import Amount, Name
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.reader import Phrase, joined, plural, term
-from sprag.service.results.fronts import history, worst_places
-from sprag.service.results.headlines.headline import (
+from sprag_study.sentences import Amount, Name
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.reader import Phrase, joined, plural, term
+from sprag_study.service.results.fronts import history, worst_places
+from sprag_study.service.results.headlines.headline import (
     DIMENSION_DIGITS,
     MOST,
     NOTHING,
@@ -26,9 +26,9 @@ from sprag.service.results.headlines.headline import (
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from sprag.service.results.fronts import Designs
-    from sprag.worker.models.presentation import Better
-    from sprag.worker.planning.goals import Limit
+    from sprag_study.service.results.fronts import Designs
+    from sprag_study.worker.models.presentation import Better
+    from sprag_study.worker.planning.goals import Limit
 
 #: Relative change of the best value that counts as an improvement.
 _BETTER: Final = 1e-3

@@ -8,24 +8,24 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import plural
-from sprag.service.faults import refused
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.results.curve_cases import select
-from sprag.service.results.curves import CurveQuery, Fetch, not_run
-from sprag.service.results.defaults import main_query
-from sprag.service.results.refined import Line
-from sprag.service.results.regimes import kind_columns
-from sprag.service.results.selection import axis_name, held_texts, locate_axes
-from sprag.worker import models
-from sprag.worker.codes import PENDING
-from sprag.worker.spread import DRIVE
+from sprag_study.sentences import plural
+from sprag_study.service.faults import refused
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.results.curve_cases import select
+from sprag_study.service.results.curves import CurveQuery, Fetch, not_run
+from sprag_study.service.results.defaults import main_query
+from sprag_study.service.results.refined import Line
+from sprag_study.service.results.regimes import kind_columns
+from sprag_study.service.results.selection import axis_name, held_texts, locate_axes
+from sprag_study.worker import models
+from sprag_study.worker.codes import PENDING
+from sprag_study.worker.spread import DRIVE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.study import Study
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.study import Study
 
     Numbers = NDArray[np.float64]
 

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import Name
-from sprag.service.languages import N_
-from sprag.service.reading.reader import Phrase, joined
-from sprag.service.results.tolerances.shares import LEAST_DRIVES, Share, shares
+from sprag_study.sentences import Name
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.reader import Phrase, joined
+from sprag_study.service.results.tolerances.shares import LEAST_DRIVES, Share, shares
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
     Numbers = NDArray[np.float64]
 

@@ -9,23 +9,23 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from sprag.sentences import Amount, Name, Sentence, joined, plural
-from sprag.service.faults import refused
-from sprag.service.languages import N_
-from sprag.service.reading.catalogue import result_of
-from sprag.service.reading.limits import at_most
-from sprag.service.reading.numbers import in_language
-from sprag.service.reading.reader import Phrase, term
-from sprag.service.reading.units import QuantityError, plain_signs, split_quantity, to_float, typed_value
-from sprag.service.results.selection import listed, numeric_results, of_name, refuse_mixed_texts
-from sprag.worker import models
-from sprag.worker.models.usable import against
+from sprag_study.sentences import Amount, Name, Sentence, joined, plural
+from sprag_study.service.faults import refused
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.catalogue import result_of
+from sprag_study.service.reading.limits import at_most
+from sprag_study.service.reading.numbers import in_language
+from sprag_study.service.reading.reader import Phrase, term
+from sprag_study.service.reading.units import QuantityError, plain_signs, split_quantity, to_float, typed_value
+from sprag_study.service.results.selection import listed, numeric_results, of_name, refuse_mixed_texts
+from sprag_study.worker import models
+from sprag_study.worker.models.usable import against
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.study import Study
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.study import Study
 
     Numbers = NDArray[np.float64]
 

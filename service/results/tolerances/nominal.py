@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.worker.spread import DRIVE
-from sprag.worker.study import without_drives
+from sprag_study.worker.spread import DRIVE
+from sprag_study.worker.study import without_drives
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.results.curves import Fetch
-    from sprag.service.storage.studies.records import CaseColumns
-    from sprag.worker.study import Study
+    from sprag_study.service.results.curves import Fetch
+    from sprag_study.service.storage.studies.records import CaseColumns
+    from sprag_study.worker.study import Study
 
 
 def nominal_only(study: Study, fetch: Fetch) -> tuple[Study, Fetch]:

@@ -8,24 +8,24 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import Sentence
-from sprag.service.faults import refused
-from sprag.service.results.curve_cases import most_numbers
-from sprag.service.results.curves import Fetch
-from sprag.service.results.refined import Line
-from sprag.service.results.selection import numeric_results
-from sprag.service.results.tolerances.batch import Asked, Places, Rows, places_of, read
-from sprag.service.results.tolerances.causes import Causes, Matrix, causes_of
-from sprag.service.results.tolerances.quantiles import Quantiles, quantiles
-from sprag.worker.limits import MAX_CURVE_VALUES
+from sprag_study.sentences import Sentence
+from sprag_study.service.faults import refused
+from sprag_study.service.results.curve_cases import most_numbers
+from sprag_study.service.results.curves import Fetch
+from sprag_study.service.results.refined import Line
+from sprag_study.service.results.selection import numeric_results
+from sprag_study.service.results.tolerances.batch import Asked, Places, Rows, places_of, read
+from sprag_study.service.results.tolerances.causes import Causes, Matrix, causes_of
+from sprag_study.service.results.tolerances.quantiles import Quantiles, quantiles
+from sprag_study.worker.limits import MAX_CURVE_VALUES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.study import Study
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.study import Study
 
     Numbers = NDArray[np.float64]
 

@@ -5,18 +5,18 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from sprag.sentences import Amount, Name
-from sprag.service.languages import decimal
-from sprag.service.reading.reader import Phrase, joined, plural
+from sprag_study.sentences import Amount, Name
+from sprag_study.service.languages import decimal
+from sprag_study.service.reading.reader import Phrase, joined, plural
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from sprag.service.results.refined import Line
-    from sprag.service.results.tolerances.batch import Places
-    from sprag.service.results.tolerances.causes import Causes
-    from sprag.service.results.tolerances.yields import YieldLine
-    from sprag.worker.study import Study
+    from sprag_study.service.results.refined import Line
+    from sprag_study.service.results.tolerances.batch import Places
+    from sprag_study.service.results.tolerances.causes import Causes
+    from sprag_study.service.results.tolerances.yields import YieldLine
+    from sprag_study.worker.study import Study
 
 
 def at_line(places: Places, line: Line) -> Phrase:

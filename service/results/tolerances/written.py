@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from sprag.service import exports
-from sprag.service.answers import filled
-from sprag.service.answers.results import ResultMeaning
-from sprag.service.json_text import numbers
-from sprag.service.reading.catalogue import unit_of
+from sprag_study.service import exports
+from sprag_study.service.answers import filled
+from sprag_study.service.answers.results import ResultMeaning
+from sprag_study.service.json_text import numbers
+from sprag_study.service.reading.catalogue import unit_of
 
 if TYPE_CHECKING:
-    from sprag.service.answers.tolerances import (
+    from sprag_study.service.answers.tolerances import (
         CausesInfo,
         ConditionInfo,
         PlacesAxis,
@@ -23,16 +23,16 @@ if TYPE_CHECKING:
         YieldReport,
         YieldShare,
     )
-    from sprag.service.reading.quantities import Units
-    from sprag.service.results.tolerances.batch import Places
-    from sprag.service.results.tolerances.causes import Causes
-    from sprag.service.results.tolerances.conditions import Condition
-    from sprag.service.results.tolerances.quantiles import Proportion
-    from sprag.service.results.tolerances.ribbons import Ribbon, RibbonLine
-    from sprag.service.results.tolerances.ribbons import Spread as ResultSpread
-    from sprag.service.results.tolerances.yields import WorstDrive as Worst
-    from sprag.service.results.tolerances.yields import Yield, YieldLine
-    from sprag.worker.study import Study
+    from sprag_study.service.reading.quantities import Units
+    from sprag_study.service.results.tolerances.batch import Places
+    from sprag_study.service.results.tolerances.causes import Causes
+    from sprag_study.service.results.tolerances.conditions import Condition
+    from sprag_study.service.results.tolerances.quantiles import Proportion
+    from sprag_study.service.results.tolerances.ribbons import Ribbon, RibbonLine
+    from sprag_study.service.results.tolerances.ribbons import Spread as ResultSpread
+    from sprag_study.service.results.tolerances.yields import WorstDrive as Worst
+    from sprag_study.service.results.tolerances.yields import Yield, YieldLine
+    from sprag_study.worker.study import Study
 
 
 def tolerances_json(study: Study) -> list[ToleranceInfo]:

@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.results.curves import Fetch
-from sprag.service.results.refined import Line
-from sprag.service.results.tolerances.batch import Asked, Places, Rows, places_of, read
-from sprag.service.results.tolerances.causes import Causes, variance_causes
-from sprag.service.results.tolerances.conditions import Condition, read_conditions
-from sprag.service.results.tolerances.nominal import deviations
-from sprag.service.results.tolerances.quantiles import Proportion, proportion
-from sprag.worker import models
+from sprag_study.service.results.curves import Fetch
+from sprag_study.service.results.refined import Line
+from sprag_study.service.results.tolerances.batch import Asked, Places, Rows, places_of, read
+from sprag_study.service.results.tolerances.causes import Causes, variance_causes
+from sprag_study.service.results.tolerances.conditions import Condition, read_conditions
+from sprag_study.service.results.tolerances.nominal import deviations
+from sprag_study.service.results.tolerances.quantiles import Proportion, proportion
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.study import Study
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.study import Study
 
     Numbers = NDArray[np.float64]
 

@@ -9,26 +9,26 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.sentences import Amount, Place, Sentence, joined
-from sprag.service.reading.catalogue import range_sentence
-from sprag.service.reading.limits import at_most, at_most_cases, unit_list
-from sprag.service.reading.texts import quantity_text
-from sprag.service.spec.axes.blocks import first_rows
-from sprag.service.spec.axes.values import PLANS, Plan, any_count, count_text
-from sprag.service.spec.described import Listed, Record, choice
-from sprag.service.spec.report import Report, join
-from sprag.service.spec.schema.quantity import QUANTITY, Schema
-from sprag.worker.directions import SWEEP
-from sprag.worker.limits import MAX_AXIS_VALUES, MAX_CASES, MAX_TIED_PATHS
-from sprag.worker.models import Parameter
-from sprag.worker.models.parameters import in_range
-from sprag.worker.study import Axis, Combine
+from sprag_study.sentences import Amount, Place, Sentence, joined
+from sprag_study.service.reading.catalogue import range_sentence
+from sprag_study.service.reading.limits import at_most, at_most_cases, unit_list
+from sprag_study.service.reading.texts import quantity_text
+from sprag_study.service.spec.axes.blocks import first_rows
+from sprag_study.service.spec.axes.values import PLANS, Plan, any_count, count_text
+from sprag_study.service.spec.described import Listed, Record, choice
+from sprag_study.service.spec.report import Report, join
+from sprag_study.service.spec.schema.quantity import QUANTITY, Schema
+from sprag_study.worker.directions import SWEEP
+from sprag_study.worker.limits import MAX_AXIS_VALUES, MAX_CASES, MAX_TIED_PATHS
+from sprag_study.worker.models import Parameter
+from sprag_study.worker.models.parameters import in_range
+from sprag_study.worker.study import Axis, Combine
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.spec.machine.machine import Machine
-    from sprag.service.spec.node import Node
+    from sprag_study.service.spec.machine.machine import Machine
+    from sprag_study.service.spec.node import Node
 
 _PATH: Final[Schema] = {
     "type": "string",

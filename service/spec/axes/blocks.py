@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sprag.worker.study import Axis
+from sprag_study.worker.study import Axis
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

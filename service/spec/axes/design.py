@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import Sentence, plural
-from sprag.service.reading.texts import quantity_text
-from sprag.service.spec.axes.axes import ADAPTIVE, AXIS, check_paths, expand, read_axes, read_axis
-from sprag.service.spec.axes.blocks import (
+from sprag_study.sentences import Sentence, plural
+from sprag_study.service.reading.texts import quantity_text
+from sprag_study.service.spec.axes.axes import ADAPTIVE, AXIS, check_paths, expand, read_axes, read_axis
+from sprag_study.service.spec.axes.blocks import (
     Block,
     as_axes,
     chosen,
@@ -27,21 +27,21 @@ from sprag.service.spec.axes.blocks import (
     product,
     side_by_side,
 )
-from sprag.service.spec.axes.exclude import kept, read_exclude
-from sprag.service.spec.axes.points import POINTS, read_points
-from sprag.service.spec.axes.sample import SAMPLE, read_sample
-from sprag.service.spec.axes.values import any_count, count_text
-from sprag.service.spec.described import Listed, Record, Variants, choice
-from sprag.service.spec.node import Node
-from sprag.service.spec.report import Report
-from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_COLUMNS
-from sprag.worker.models.formulas import evaluate
+from sprag_study.service.spec.axes.exclude import kept, read_exclude
+from sprag_study.service.spec.axes.points import POINTS, read_points
+from sprag_study.service.spec.axes.sample import SAMPLE, read_sample
+from sprag_study.service.spec.axes.values import any_count, count_text
+from sprag_study.service.spec.described import Listed, Record, Variants, choice
+from sprag_study.service.spec.node import Node
+from sprag_study.service.spec.report import Report
+from sprag_study.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_COLUMNS
+from sprag_study.worker.models.formulas import evaluate
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.spec.machine.machine import Machine
-    from sprag.worker.study import Axis, Combine
+    from sprag_study.service.spec.machine.machine import Machine
+    from sprag_study.worker.study import Axis, Combine
 
 _COMBINE_HELP: Final = (
     "grid: every combination of the axes (the first varies slowest); zip: the axes side by side; union: one after the "

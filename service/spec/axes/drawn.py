@@ -7,19 +7,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.reading.catalogue import range_sentence
-from sprag.service.spec.axes.axes import PATHS, read_paths
-from sprag.service.spec.described import Record
-from sprag.service.spec.draws.described import DISTRIBUTION, FIELDS, read_measured, read_plus_minus
-from sprag.service.spec.draws.distributions import Distribution
-from sprag.service.spec.lists import refuse_mixed
-from sprag.service.spec.schema.quantity import QUANTITY
+from sprag_study.service.reading.catalogue import range_sentence
+from sprag_study.service.spec.axes.axes import PATHS, read_paths
+from sprag_study.service.spec.described import Record
+from sprag_study.service.spec.draws.described import DISTRIBUTION, FIELDS, read_measured, read_plus_minus
+from sprag_study.service.spec.draws.distributions import Distribution
+from sprag_study.service.spec.lists import refuse_mixed
+from sprag_study.service.spec.schema.quantity import QUANTITY
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.spec.node import Node
-    from sprag.worker.models import Parameter
+    from sprag_study.service.spec.node import Node
+    from sprag_study.worker.models import Parameter
 
 #: A part of a sample with a distribution.
 DRAWN: Final = Record(

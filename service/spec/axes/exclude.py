@@ -7,20 +7,20 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.service.reading.limits import one_of
-from sprag.service.reading.together import split_list
-from sprag.service.spec.described import Record
-from sprag.service.spec.lists import read_list_text, refuse_blanks, refuse_mixed
-from sprag.service.spec.schema.quantity import QUANTITY
-from sprag.worker.limits import MAX_AXIS_VALUES
-from sprag.worker.study import SAME_VALUE
+from sprag_study.service.reading.limits import one_of
+from sprag_study.service.reading.together import split_list
+from sprag_study.service.spec.described import Record
+from sprag_study.service.spec.lists import read_list_text, refuse_blanks, refuse_mixed
+from sprag_study.service.spec.schema.quantity import QUANTITY
+from sprag_study.worker.limits import MAX_AXIS_VALUES
+from sprag_study.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from sprag.service.spec.node import Node
+    from sprag_study.service.spec.node import Node
 
 LIMITS: Final = Record(
     {

@@ -6,14 +6,14 @@ from typing import Final
 
 import numpy as np
 
-from sprag.service.reading.texts import shorten_text
-from sprag.service.spec.axes.axes import read_paths
-from sprag.service.spec.axes.blocks import Block
-from sprag.service.spec.csv_text import Column, read_columns, read_csv
-from sprag.service.spec.described import Record
-from sprag.service.spec.node import Node
-from sprag.service.spec.table_text import heading_of
-from sprag.worker.limits import MAX_AXIS_VALUES, MAX_COLUMNS
+from sprag_study.service.reading.texts import shorten_text
+from sprag_study.service.spec.axes.axes import read_paths
+from sprag_study.service.spec.axes.blocks import Block
+from sprag_study.service.spec.csv_text import Column, read_columns, read_csv
+from sprag_study.service.spec.described import Record
+from sprag_study.service.spec.node import Node
+from sprag_study.service.spec.table_text import heading_of
+from sprag_study.worker.limits import MAX_AXIS_VALUES, MAX_COLUMNS
 
 POINTS: Final = Record(
     {

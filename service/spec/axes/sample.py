@@ -10,25 +10,25 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from sprag.sentences import Sentence
-from sprag.service.spec.axes.axes import PATHS, read_paths
-from sprag.service.spec.axes.blocks import Block
-from sprag.service.spec.axes.drawn import DRAWN, SampleDistribution, is_distribution, read_distribution
-from sprag.service.spec.described import Described, Listed, Record, Variants, choice, named
-from sprag.service.spec.draws.correlations import CORRELATIONS, read_correlations
-from sprag.service.spec.draws.unit import cases_of, correlated, unit_sample
-from sprag.service.spec.lists import refuse_mixed
-from sprag.service.spec.schema.quantity import QUANTITY
-from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES
-from sprag.worker.planning.goals.draws import exponential, logarithm
+from sprag_study.sentences import Sentence
+from sprag_study.service.spec.axes.axes import PATHS, read_paths
+from sprag_study.service.spec.axes.blocks import Block
+from sprag_study.service.spec.axes.drawn import DRAWN, SampleDistribution, is_distribution, read_distribution
+from sprag_study.service.spec.described import Described, Listed, Record, Variants, choice, named
+from sprag_study.service.spec.draws.correlations import CORRELATIONS, read_correlations
+from sprag_study.service.spec.draws.unit import cases_of, correlated, unit_sample
+from sprag_study.service.spec.lists import refuse_mixed
+from sprag_study.service.spec.schema.quantity import QUANTITY
+from sprag_study.worker.limits import MAX_AXES, MAX_AXIS_VALUES
+from sprag_study.worker.planning.goals.draws import exponential, logarithm
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from sprag.service.spec.node import Node
-    from sprag.worker.models import Parameter
+    from sprag_study.service.spec.node import Node
+    from sprag_study.worker.models import Parameter
 
 _METHOD_HELP: Final = (
     "latin_hypercube and sobol fill the ranges evenly, random points are independent; saltelli is the design for Sobol "

@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.sentences import Sentence, Typed
-from sprag.service.languages import N_
-from sprag.service.reading.limits import values_to
-from sprag.service.reading.ranges import TypedRange, typed_range
-from sprag.service.reading.units import QuantityError, parse_exact, to_float
-from sprag.service.spec.lists import read_list, read_list_text, read_together
-from sprag.service.spec.node import Node
-from sprag.worker.limits import MAX_AXIS_VALUES
-from sprag.worker.models import Parameter
-from sprag.worker.models.parameters import in_range
+from sprag_study.sentences import Sentence, Typed
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.limits import values_to
+from sprag_study.service.reading.ranges import TypedRange, typed_range
+from sprag_study.service.reading.units import QuantityError, parse_exact, to_float
+from sprag_study.service.spec.lists import read_list, read_list_text, read_together
+from sprag_study.service.spec.node import Node
+from sprag_study.worker.limits import MAX_AXIS_VALUES
+from sprag_study.worker.models import Parameter
+from sprag_study.worker.models.parameters import in_range
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

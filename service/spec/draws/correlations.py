@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.sentences import Amount, Sentence
-from sprag.service.languages import N_
-from sprag.service.spec.described import Described, Listed, Record
-from sprag.service.spec.fields import expanded
-from sprag.worker.limits import MAX_CORRELATIONS
+from sprag_study.sentences import Amount, Sentence
+from sprag_study.service.languages import N_
+from sprag_study.service.spec.described import Described, Listed, Record
+from sprag_study.service.spec.fields import expanded
+from sprag_study.worker.limits import MAX_CORRELATIONS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.spec.node import Node
+    from sprag_study.service.spec.node import Node
 
 _COEFFICIENT: Final = Described("coefficient", "", "correlation of the normal scores", "number", -1.0, 1.0)
 _PATH: Final = {"type": "string", "examples": ["pendulums.*.mass"]}

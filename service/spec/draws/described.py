@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from sprag.sentences import Amount, Sentence
-from sprag.service.languages import N_
-from sprag.service.reading.together import split_list
-from sprag.service.reading.units import QuantityError, parse_quantity
-from sprag.service.spec.described import Field, Listed, choice
-from sprag.service.spec.draws.distributions import SIGMAS
-from sprag.service.spec.lists import read_list, read_list_text
-from sprag.service.spec.node import Node
-from sprag.service.spec.schema.quantity import QUANTITY
-from sprag.service.spec.shares import in_percent
+from sprag_study.sentences import Amount, Sentence
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.together import split_list
+from sprag_study.service.reading.units import QuantityError, parse_quantity
+from sprag_study.service.spec.described import Field, Listed, choice
+from sprag_study.service.spec.draws.distributions import SIGMAS
+from sprag_study.service.spec.lists import read_list, read_list_text
+from sprag_study.service.spec.node import Node
+from sprag_study.service.spec.schema.quantity import QUANTITY
+from sprag_study.service.spec.shares import in_percent
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.worker.models import Parameter
+    from sprag_study.worker.models import Parameter
 
 DISTRIBUTION: Final = choice(
     "distribution",

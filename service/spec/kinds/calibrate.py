@@ -4,20 +4,27 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.sentences import Sentence, plural
-from sprag.service.spec.axes.axes import PATHS, check_paths
-from sprag.service.spec.described import Described, Listed, Record, choice, named
-from sprag.service.spec.fields import expanded
-from sprag.service.spec.kinds.draft import Kind
-from sprag.service.spec.kinds.fields import read_ends, read_path_of
-from sprag.service.spec.kinds.measured_points import MeasuredTable, read_results, read_table
-from sprag.service.spec.node import Node
-from sprag.service.spec.schema.quantity import QUANTITY
-from sprag.worker.errors import WrongPlanError
-from sprag.worker.planning.calibrate.plan import LOSSES, MOST_MEASURED, MOST_UNKNOWN, REFITS, CalibratePlan, Unknown
+from sprag_study.sentences import Sentence, plural
+from sprag_study.service.spec.axes.axes import PATHS, check_paths
+from sprag_study.service.spec.described import Described, Listed, Record, choice, named
+from sprag_study.service.spec.fields import expanded
+from sprag_study.service.spec.kinds.draft import Kind
+from sprag_study.service.spec.kinds.fields import read_ends, read_path_of
+from sprag_study.service.spec.kinds.measured_points import MeasuredTable, read_results, read_table
+from sprag_study.service.spec.node import Node
+from sprag_study.service.spec.schema.quantity import QUANTITY
+from sprag_study.worker.errors import WrongPlanError
+from sprag_study.worker.planning.calibrate.plan import (
+    LOSSES,
+    MOST_MEASURED,
+    MOST_UNKNOWN,
+    REFITS,
+    CalibratePlan,
+    Unknown,
+)
 
 if TYPE_CHECKING:
-    from sprag.service.spec.kinds.draft import Draft, Finish
+    from sprag_study.service.spec.kinds.draft import Draft, Finish
 
 _CSV: Final = (
     "text of a CSV file: a column for each parameter that was set, for each measured result and, behind it, for its "

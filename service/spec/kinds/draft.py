@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from sprag.worker.study import Axis, Combine, Study
+from sprag_study.worker.study import Axis, Combine, Study
 
 if TYPE_CHECKING:
-    from sprag.service.spec.described import Field
-    from sprag.service.spec.node import Node
-    from sprag.worker.spread import Spread
+    from sprag_study.service.spec.described import Field
+    from sprag_study.service.spec.node import Node
+    from sprag_study.worker.spread import Spread
 
 
 @dataclass

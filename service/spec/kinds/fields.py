@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.sentences import Sentence, Typed
-from sprag.service.reading.catalogue import result_of, unknown_result
-from sprag.service.reading.limits import quoted
-from sprag.service.reading.texts import quantity_text
-from sprag.service.reading.units import QuantityError, example, parse_quantity
-from sprag.service.spec.axes.axes import read_paths
-from sprag.service.spec.lists import refuse_mixed
+from sprag_study.sentences import Sentence, Typed
+from sprag_study.service.reading.catalogue import result_of, unknown_result
+from sprag_study.service.reading.limits import quoted
+from sprag_study.service.reading.texts import quantity_text
+from sprag_study.service.reading.units import QuantityError, example, parse_quantity
+from sprag_study.service.spec.axes.axes import read_paths
+from sprag_study.service.spec.lists import refuse_mixed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.spec.node import Node
-    from sprag.worker.models import ResultInfo
+    from sprag_study.service.spec.node import Node
+    from sprag_study.worker.models import ResultInfo
 
 #: JSON Schema of the name of a result.
 RESULT: Final[dict[str, Any]] = {"type": "string", "examples": ["shaft.speed.mean", "efficiency", "torque.max"]}

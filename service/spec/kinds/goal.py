@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.sentences import Place, Sentence, joined
-from sprag.service.reading.limits import at_most_cases
-from sprag.service.reading.texts import did_you_mean
-from sprag.service.spec.axes.axes import PATHS, check_paths, expand
-from sprag.service.spec.axes.values import plan_values
-from sprag.service.spec.described import Described, Listed, Record, Variants, choice
-from sprag.service.spec.kinds.draft import Kind
-from sprag.service.spec.kinds.fields import (
+from sprag_study.sentences import Place, Sentence, joined
+from sprag_study.service.reading.limits import at_most_cases
+from sprag_study.service.reading.texts import did_you_mean
+from sprag_study.service.spec.axes.axes import PATHS, check_paths, expand
+from sprag_study.service.spec.axes.values import plan_values
+from sprag_study.service.spec.described import Described, Listed, Record, Variants, choice
+from sprag_study.service.spec.kinds.draft import Kind
+from sprag_study.service.spec.kinds.fields import (
     RESULT,
     read_ends,
     read_numeric_result,
@@ -20,18 +20,18 @@ from sprag.service.spec.kinds.fields import (
     read_result,
     read_value,
 )
-from sprag.service.spec.kinds.robust import QUANTILE, check_drives, read_quantile, refuse_beside_yield
-from sprag.service.spec.lists import refuse_mixed
-from sprag.service.spec.schema.quantity import QUANTITY
-from sprag.service.spec.shares import in_percent
-from sprag.worker.limits import MAX_PLANNED_CASES
+from sprag_study.service.spec.kinds.robust import QUANTILE, check_drives, read_quantile, refuse_beside_yield
+from sprag_study.service.spec.lists import refuse_mixed
+from sprag_study.service.spec.schema.quantity import QUANTITY
+from sprag_study.service.spec.shares import in_percent
+from sprag_study.worker.limits import MAX_PLANNED_CASES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.spec.kinds.draft import Draft, Finish
-    from sprag.service.spec.node import Node
-    from sprag.worker.models import ResultInfo
+    from sprag_study.service.spec.kinds.draft import Draft, Finish
+    from sprag_study.service.spec.node import Node
+    from sprag_study.worker.models import ResultInfo
 
 _KINDS: Final = ("is", "at_least", "at_most")
 _MAX: Final = Described("max", "", "whether the largest value is the best", "flag", default=False)

@@ -7,16 +7,16 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from sprag.sentences import Sentence, Typed
-from sprag.service.languages import N_
-from sprag.service.reading.catalogue import result_of
-from sprag.service.reading.numbers import parse_number
-from sprag.service.reading.texts import did_you_mean, shorten_text
-from sprag.service.reading.units import QuantityError, parse_quantity
-from sprag.service.spec.csv_text import Column, read_columns, read_csv, refuse_cell, refuse_mixed_column
-from sprag.service.spec.node import Node
-from sprag.service.spec.table_text import CsvRow, heading_of
-from sprag.worker.planning.calibrate.plan import MOST_MEASURED, Measured
+from sprag_study.sentences import Sentence, Typed
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.catalogue import result_of
+from sprag_study.service.reading.numbers import parse_number
+from sprag_study.service.reading.texts import did_you_mean, shorten_text
+from sprag_study.service.reading.units import QuantityError, parse_quantity
+from sprag_study.service.spec.csv_text import Column, read_columns, read_csv, refuse_cell, refuse_mixed_column
+from sprag_study.service.spec.node import Node
+from sprag_study.service.spec.table_text import CsvRow, heading_of
+from sprag_study.worker.planning.calibrate.plan import MOST_MEASURED, Measured
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

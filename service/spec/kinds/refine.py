@@ -6,22 +6,22 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
-from sprag.sentences import Sentence, plural
-from sprag.service.spec.axes.axes import ADAPTIVE, axis_values, check_paths
-from sprag.service.spec.axes.design import AXES
-from sprag.service.spec.described import Described, Listed, Record
-from sprag.service.spec.kinds.draft import Kind
-from sprag.service.spec.kinds.fields import RESULT, read_ends, read_numeric_result, read_path_of
-from sprag.worker.errors import WrongPlanError
-from sprag.worker.limits import MAX_PLANNED_CASES
-from sprag.worker.models import regime_info
-from sprag.worker.planning.refine_plan import AdaptiveAxis, FixedAxis, RefinePlan
+from sprag_study.sentences import Sentence, plural
+from sprag_study.service.spec.axes.axes import ADAPTIVE, axis_values, check_paths
+from sprag_study.service.spec.axes.design import AXES
+from sprag_study.service.spec.described import Described, Listed, Record
+from sprag_study.service.spec.kinds.draft import Kind
+from sprag_study.service.spec.kinds.fields import RESULT, read_ends, read_numeric_result, read_path_of
+from sprag_study.worker.errors import WrongPlanError
+from sprag_study.worker.limits import MAX_PLANNED_CASES
+from sprag_study.worker.models import regime_info
+from sprag_study.worker.planning.refine_plan import AdaptiveAxis, FixedAxis, RefinePlan
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.spec.kinds.draft import Draft, Finish
-    from sprag.service.spec.node import Node
+    from sprag_study.service.spec.kinds.draft import Draft, Finish
+    from sprag_study.service.spec.node import Node
 
 #: Largest error that can be asked for, and the smallest.
 MIN_ERROR, MAX_ERROR = 1e-4, 0.2

@@ -5,25 +5,25 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.sentences import Sentence
-from sprag.service.spec.axes.design import AXES, COMBINE, read_design
-from sprag.service.spec.axes.exclude import EXCLUDE
-from sprag.service.spec.kinds.calibrate import CALIBRATION
-from sprag.service.spec.kinds.draft import Draft, Kind
-from sprag.service.spec.kinds.goal import SEARCH
-from sprag.service.spec.kinds.refine import REFINEMENT, is_adaptive
-from sprag.service.spec.kinds.starts import MANY_STARTS
-from sprag.service.spec.kinds.sweep import SWEEPS
-from sprag.service.spec.kinds.tolerances import DRIVES
-from sprag.worker import models
-from sprag.worker.planning import planner_of
-from sprag.worker.study import Axis
+from sprag_study.sentences import Sentence
+from sprag_study.service.spec.axes.design import AXES, COMBINE, read_design
+from sprag_study.service.spec.axes.exclude import EXCLUDE
+from sprag_study.service.spec.kinds.calibrate import CALIBRATION
+from sprag_study.service.spec.kinds.draft import Draft, Kind
+from sprag_study.service.spec.kinds.goal import SEARCH
+from sprag_study.service.spec.kinds.refine import REFINEMENT, is_adaptive
+from sprag_study.service.spec.kinds.starts import MANY_STARTS
+from sprag_study.service.spec.kinds.sweep import SWEEPS
+from sprag_study.service.spec.kinds.tolerances import DRIVES
+from sprag_study.worker import models
+from sprag_study.worker.planning import planner_of
+from sprag_study.worker.study import Axis
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
-    from sprag.service.spec.described import Field
-    from sprag.service.spec.kinds.draft import Finish
+    from sprag_study.service.spec.described import Field
+    from sprag_study.service.spec.kinds.draft import Finish
 
 #: Those that choose their own cases, by their fields.
 _PLANNED: Final = {name: kind for kind in (REFINEMENT, SEARCH, CALIBRATION) for name in kind.fields}

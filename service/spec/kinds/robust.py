@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.spec.node import Node
+from sprag_study.service.spec.node import Node
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from sprag.service.spec.report import Report
+    from sprag_study.service.spec.report import Report
 
 #: Fields of a goal or a constraint about the drives.
 ROBUST: Final = ("quantile", "yield")

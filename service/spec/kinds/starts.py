@@ -7,26 +7,26 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import Sentence, joined, plural
-from sprag.service.languages import N_
-from sprag.service.reading.catalogue import range_sentence
-from sprag.service.reading.limits import at_most
-from sprag.service.spec.axes.axes import varied_values
-from sprag.service.spec.described import Described, Record, named
-from sprag.service.spec.draws.unit import unit_sample
-from sprag.service.spec.fields import expanded
-from sprag.service.spec.kinds.draft import Kind
-from sprag.service.spec.lists import refuse_mixed
-from sprag.service.spec.schema.quantity import QUANTITY
-from sprag.worker.limits import MAX_START_RANGES, MAX_STARTS
-from sprag.worker.models import START_STATES, is_settled
-from sprag.worker.models.vibration_drive.start_states import LOCKED, is_initial
+from sprag_study.sentences import Sentence, joined, plural
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.catalogue import range_sentence
+from sprag_study.service.reading.limits import at_most
+from sprag_study.service.spec.axes.axes import varied_values
+from sprag_study.service.spec.described import Described, Record, named
+from sprag_study.service.spec.draws.unit import unit_sample
+from sprag_study.service.spec.fields import expanded
+from sprag_study.service.spec.kinds.draft import Kind
+from sprag_study.service.spec.lists import refuse_mixed
+from sprag_study.service.spec.schema.quantity import QUANTITY
+from sprag_study.worker.limits import MAX_START_RANGES, MAX_STARTS
+from sprag_study.worker.models import START_STATES, is_settled
+from sprag_study.worker.models.vibration_drive.start_states import LOCKED, is_initial
 
 if TYPE_CHECKING:
-    from sprag.service.spec.kinds.draft import Draft
-    from sprag.service.spec.node import Node
-    from sprag.worker.models import Parameter
-    from sprag.worker.study import Axis
+    from sprag_study.service.spec.kinds.draft import Draft
+    from sprag_study.service.spec.node import Node
+    from sprag_study.worker.models import Parameter
+    from sprag_study.worker.study import Axis
 
 _ALLOWED: Final = N_(
     'ranges of initial values, as in {"shaft.initial_speed": ["0 rad/s", "30 rad/s"]}; `*` stands for every pendulum'

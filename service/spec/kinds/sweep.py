@@ -6,21 +6,21 @@ from collections.abc import Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
-from sprag.sentences import Sentence
-from sprag.service.languages import N_
-from sprag.service.reading.limits import at_most_cases
-from sprag.service.spec.axes.axes import SWEPT
-from sprag.service.spec.kinds.draft import Kind
-from sprag.service.spec.node import Node
-from sprag.worker import models
-from sprag.worker.directions import DOWN, SWEEP, UP
-from sprag.worker.limits import MAX_CASES
-from sprag.worker.models.vibration_drive.start_states import is_initial
-from sprag.worker.study import Axis
+from sprag_study.sentences import Sentence
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.limits import at_most_cases
+from sprag_study.service.spec.axes.axes import SWEPT
+from sprag_study.service.spec.kinds.draft import Kind
+from sprag_study.service.spec.node import Node
+from sprag_study.worker import models
+from sprag_study.worker.directions import DOWN, SWEEP, UP
+from sprag_study.worker.limits import MAX_CASES
+from sprag_study.worker.models.vibration_drive.start_states import is_initial
+from sprag_study.worker.study import Axis
 
 if TYPE_CHECKING:
-    from sprag.service.spec.kinds.draft import Draft, Finish
-    from sprag.worker.study import Study
+    from sprag_study.service.spec.kinds.draft import Draft, Finish
+    from sprag_study.worker.study import Study
 
 _DIRECTIONS: Final = {"up": (UP,), "down": (DOWN,), "both": (UP, DOWN)}
 _PLAIN: Final = N_("one axis of a plain grid")

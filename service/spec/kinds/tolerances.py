@@ -10,34 +10,34 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.sentences import Amount, Place, Sentence
-from sprag.service.languages import N_
-from sprag.service.reading.catalogue import range_sentence
-from sprag.service.reading.limits import unit_list
-from sprag.service.reading.together import AMBIGUOUS_UNIT, question
-from sprag.service.spec.described import Described, Field, Listed, Record, choice, named
-from sprag.service.spec.draws.correlations import CORRELATIONS, read_correlations
-from sprag.service.spec.draws.described import DISTRIBUTION, FIELDS, read_measured, read_plus_minus
-from sprag.service.spec.draws.distributions import Distribution
-from sprag.service.spec.draws.unit import correlated, unit_sample
-from sprag.service.spec.fields import expanded
-from sprag.service.spec.kinds.draft import Kind
-from sprag.service.spec.node import Node
-from sprag.worker.derived import blocks, involved
-from sprag.worker.limits import MAX_AXIS_VALUES, MAX_CASES, MAX_DRIVES, MAX_TOLERANCES
-from sprag.worker.models.parameters import in_range, parameter_of
-from sprag.worker.spread import DRIVE, Spread, Tolerance
-from sprag.worker.study import Axis
+from sprag_study.sentences import Amount, Place, Sentence
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.catalogue import range_sentence
+from sprag_study.service.reading.limits import unit_list
+from sprag_study.service.reading.together import AMBIGUOUS_UNIT, question
+from sprag_study.service.spec.described import Described, Field, Listed, Record, choice, named
+from sprag_study.service.spec.draws.correlations import CORRELATIONS, read_correlations
+from sprag_study.service.spec.draws.described import DISTRIBUTION, FIELDS, read_measured, read_plus_minus
+from sprag_study.service.spec.draws.distributions import Distribution
+from sprag_study.service.spec.draws.unit import correlated, unit_sample
+from sprag_study.service.spec.fields import expanded
+from sprag_study.service.spec.kinds.draft import Kind
+from sprag_study.service.spec.node import Node
+from sprag_study.worker.derived import blocks, involved
+from sprag_study.worker.limits import MAX_AXIS_VALUES, MAX_CASES, MAX_DRIVES, MAX_TOLERANCES
+from sprag_study.worker.models.parameters import in_range, parameter_of
+from sprag_study.worker.spread import DRIVE, Spread, Tolerance
+from sprag_study.worker.study import Axis
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from sprag.service.spec.kinds.draft import Draft, Finish
-    from sprag.service.spec.report import Report
-    from sprag.worker.models import Parameter
-    from sprag.worker.study import Study
+    from sprag_study.service.spec.kinds.draft import Draft, Finish
+    from sprag_study.service.spec.report import Report
+    from sprag_study.worker.models import Parameter
+    from sprag_study.worker.study import Study
 
 _PATH: Final = {"type": "string", "examples": ["pendulums.*.backlash", "shaft.load"]}
 _SHARED: Final = Described("shared", "", "whether all its parameters share one draw", "flag", default=False)

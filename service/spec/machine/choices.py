@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from sprag.service.languages import N_
-from sprag.service.spec.described import FIT, Described, Listed, below
-from sprag.service.spec.machine.shaft import SHAFT
+from sprag_study.service.languages import N_
+from sprag_study.service.spec.described import FIT, Described, Listed, below
+from sprag_study.service.spec.machine.shaft import SHAFT
 
 if TYPE_CHECKING:
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
 #: What parts of a machine shaft are, whose descriptions say what they have.
 PARTS: Final = {

@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.sentences import Sentence
-from sprag.service.reading.texts import quantity_text
-from sprag.service.spec.described import FIT, Listed, Record, Variants
-from sprag.service.spec.lists import read_list
-from sprag.service.spec.report import Report, join
-from sprag.service.spec.schema.quantity import QUANTITY
-from sprag.worker import models
-from sprag.worker.limits import MAX_CLUTCH_LAWS, MAX_CLUTCH_ROWS
-from sprag.worker.models import CLUTCH_COEFFICIENT, CLUTCH_WINDUP_LIMIT, MAX_COEFFICIENTS, Parameter
-from sprag.worker.models.parameters import placed
+from sprag_study.sentences import Sentence
+from sprag_study.service.reading.texts import quantity_text
+from sprag_study.service.spec.described import FIT, Listed, Record, Variants
+from sprag_study.service.spec.lists import read_list
+from sprag_study.service.spec.report import Report, join
+from sprag_study.service.spec.schema.quantity import QUANTITY
+from sprag_study.worker import models
+from sprag_study.worker.limits import MAX_CLUTCH_LAWS, MAX_CLUTCH_ROWS
+from sprag_study.worker.models import CLUTCH_COEFFICIENT, CLUTCH_WINDUP_LIMIT, MAX_COEFFICIENTS, Parameter
+from sprag_study.worker.models.parameters import placed
 
 if TYPE_CHECKING:
-    from sprag.service.spec.node import Node
-    from sprag.worker.models import ClutchFit
-    from sprag.worker.study import Axis, Combine
+    from sprag_study.service.spec.node import Node
+    from sprag_study.worker.models import ClutchFit
+    from sprag_study.worker.study import Axis, Combine
 
 _ANGLE = Parameter("angle", "xi", "rad", 0.0, 1e3, False, None, "measured angle")
 _TORQUE = Parameter("torque", "M", "N*m", -1e9, 1e9, False, None, "measured torque")

@@ -6,15 +6,15 @@ import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
-from sprag.sentences import Sentence
-from sprag.service.languages import N_
-from sprag.service.reading.texts import did_you_mean
-from sprag.service.spec.described import Field, Listed, Record
-from sprag.service.spec.machine.clutch import CLUTCH, Clutch, read_clutch
-from sprag.service.spec.machine.machine import Machine
-from sprag.service.spec.node import Node
-from sprag.service.spec.schema.quantity import required_of
-from sprag.worker.models import (
+from sprag_study.sentences import Sentence
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.texts import did_you_mean
+from sprag_study.service.spec.described import Field, Listed, Record
+from sprag_study.service.spec.machine.clutch import CLUTCH, Clutch, read_clutch
+from sprag_study.service.spec.machine.machine import Machine
+from sprag_study.service.spec.node import Node
+from sprag_study.service.spec.schema.quantity import required_of
+from sprag_study.worker.models import (
     MAX_COEFFICIENTS,
     MAX_PENDULUMS,
     START_STATES,
@@ -22,10 +22,10 @@ from sprag.worker.models import (
     Parameter,
     parameter_catalogue,
 )
-from sprag.worker.models.parameters import placed
+from sprag_study.worker.models.parameters import placed
 
 if TYPE_CHECKING:
-    from sprag.worker.models import ClutchFit
+    from sprag_study.worker.models import ClutchFit
 
 #: Field of the base that a service replaces by the initial values that go on from the end of a case.
 START: Final = "start"

@@ -9,12 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from sprag.sentences import Sentence
-from sprag.service.reading.texts import did_you_mean
+from sprag_study.sentences import Sentence
+from sprag_study.service.reading.texts import did_you_mean
 
 if TYPE_CHECKING:
-    from sprag.service.spec.node import Node
-    from sprag.worker.models import ClutchFit, Parameter
+    from sprag_study.service.spec.node import Node
+    from sprag_study.worker.models import ClutchFit, Parameter
 
 
 @dataclass

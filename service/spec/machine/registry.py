@@ -9,30 +9,30 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.sentences import Sentence
-from sprag.service.languages import N_
-from sprag.service.spec.axes.axes import varied_values
-from sprag.service.spec.derive import case_table, layout
-from sprag.service.spec.described import Field, Record
-from sprag.service.spec.machine.choices import Choice, drive_choices, shaft_choices
-from sprag.service.spec.machine.clutch import check_laws
-from sprag.service.spec.machine.drive import Drive, drive_record, read_drive
-from sprag.service.spec.machine.machine import read_plain
-from sprag.service.spec.machine.shaft import SHAFT, check_shaft, read_shaft
-from sprag.service.spec.machine.start_states import check_starts
-from sprag.service.spec.run import RUN, read_run, refuse_run
-from sprag.service.spec.schema.quantity import plain_schema
-from sprag.service.spec.warnings import warn_machine_shaft, warn_vibration_drive
-from sprag.worker import models
-from sprag.worker.derived import distinct_values
+from sprag_study.sentences import Sentence
+from sprag_study.service.languages import N_
+from sprag_study.service.spec.axes.axes import varied_values
+from sprag_study.service.spec.derive import case_table, layout
+from sprag_study.service.spec.described import Field, Record
+from sprag_study.service.spec.machine.choices import Choice, drive_choices, shaft_choices
+from sprag_study.service.spec.machine.clutch import check_laws
+from sprag_study.service.spec.machine.drive import Drive, drive_record, read_drive
+from sprag_study.service.spec.machine.machine import read_plain
+from sprag_study.service.spec.machine.shaft import SHAFT, check_shaft, read_shaft
+from sprag_study.service.spec.machine.start_states import check_starts
+from sprag_study.service.spec.run import RUN, read_run, refuse_run
+from sprag_study.service.spec.schema.quantity import plain_schema
+from sprag_study.service.spec.warnings import warn_machine_shaft, warn_vibration_drive
+from sprag_study.worker import models
+from sprag_study.worker.derived import distinct_values
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
-    from sprag.service.spec.machine.machine import Machine
-    from sprag.service.spec.node import Node
-    from sprag.service.spec.report import Report
-    from sprag.worker.study import Axis, Combine, Study
+    from sprag_study.service.spec.machine.machine import Machine
+    from sprag_study.service.spec.node import Node
+    from sprag_study.service.spec.report import Report
+    from sprag_study.worker.study import Axis, Combine, Study
 
     Axes = tuple[Axis, ...]
 

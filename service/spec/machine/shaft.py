@@ -10,15 +10,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from sprag.sentences import Sentence
-from sprag.service.languages import N_
-from sprag.service.reading.texts import did_you_mean
-from sprag.service.spec.described import Record, choice
-from sprag.service.spec.lists import refuse_mixed
-from sprag.service.spec.machine.machine import Machine, read_numbers
-from sprag.service.spec.machine.shaft_check import check_machine
-from sprag.service.spec.machine.shaft_drive import BALANCE, BALANCE_SIDE, DRIVE, read_balance, read_drive
-from sprag.service.spec.machine.shaft_parts import (
+from sprag_study.sentences import Sentence
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.texts import did_you_mean
+from sprag_study.service.spec.described import Record, choice
+from sprag_study.service.spec.lists import refuse_mixed
+from sprag_study.service.spec.machine.machine import Machine, read_numbers
+from sprag_study.service.spec.machine.shaft_check import check_machine
+from sprag_study.service.spec.machine.shaft_drive import BALANCE, BALANCE_SIDE, DRIVE, read_balance, read_drive
+from sprag_study.service.spec.machine.shaft_parts import (
     CONSTANTS,
     CYCLE,
     MECHANISM,
@@ -32,11 +32,11 @@ from sprag.service.spec.machine.shaft_parts import (
     read_operation,
     read_parts,
 )
-from sprag.service.spec.node import Node
-from sprag.service.spec.report import Report
-from sprag.worker import models
-from sprag.worker.models import machine_shaft
-from sprag.worker.models.parameters import model_parameter
+from sprag_study.service.spec.node import Node
+from sprag_study.service.spec.report import Report
+from sprag_study.worker import models
+from sprag_study.worker.models import machine_shaft
+from sprag_study.worker.models.parameters import model_parameter
 
 _MEAN_HELP: Final = "which mean of the speed the given mean speed and the irregularity refer to"
 MEAN_SPEED_IS: Final = choice(

@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cache, partial
 from typing import Any, Final, cast
 
-from sprag.sentences import Sentence
-from sprag.service.faults import Code
-from sprag.service.spec.report import Report
-from sprag.worker.models import (
+from sprag_study.sentences import Sentence
+from sprag_study.service.faults import Code
+from sprag_study.service.spec.report import Report
+from sprag_study.worker.models import (
     AssemblyError,
     Ending,
     ExpressionError,
@@ -21,7 +21,7 @@ from sprag.worker.models import (
     load,
     machine_shaft,
 )
-from sprag.worker.pool.child_process import uncounted
+from sprag_study.worker.pool.child_process import uncounted
 
 #: Pointer of the fault for each ending.
 _POINTERS: Final[dict[Ending | None, str]] = {

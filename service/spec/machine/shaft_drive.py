@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
-from sprag.sentences import Sentence
-from sprag.service.spec.described import Listed, Record, Variants, choice
-from sprag.service.spec.machine.shaft_parts import (
+from sprag_study.sentences import Sentence
+from sprag_study.service.spec.described import Listed, Record, Variants, choice
+from sprag_study.service.spec.machine.shaft_parts import (
     ANGLE,
     INTERPOLATION,
     diagram_of,
@@ -18,9 +18,9 @@ from sprag.service.spec.machine.shaft_parts import (
     rows_of,
     value_in,
 )
-from sprag.service.spec.node import Node
-from sprag.service.spec.schema.quantity import required_of
-from sprag.worker.models import Parameter, machine_shaft
+from sprag_study.service.spec.node import Node
+from sprag_study.service.spec.schema.quantity import required_of
+from sprag_study.worker.models import Parameter, machine_shaft
 
 BALANCE_SIDE: Final = choice(
     "balance_side", "which torque the balance makes constant or scales", "drive", "operation", default="drive"

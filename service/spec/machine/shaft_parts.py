@@ -7,16 +7,16 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from sprag.sentences import Sentence, plural
-from sprag.service.languages import N_
-from sprag.service.reading.catalogue import range_sentence
-from sprag.service.reading.units import QuantityError, parse_quantity
-from sprag.service.spec.described import Described, Field, Listed, Record, choice, named
-from sprag.service.spec.machine.shaft_tables import read_csv_rows
-from sprag.service.spec.node import Node
-from sprag.service.spec.schema.quantity import QUANTITY, required_of
-from sprag.worker import models
-from sprag.worker.models import Parameter, machine_shaft
+from sprag_study.sentences import Sentence, plural
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.catalogue import range_sentence
+from sprag_study.service.reading.units import QuantityError, parse_quantity
+from sprag_study.service.spec.described import Described, Field, Listed, Record, choice, named
+from sprag_study.service.spec.machine.shaft_tables import read_csv_rows
+from sprag_study.service.spec.node import Node
+from sprag_study.service.spec.schema.quantity import QUANTITY, required_of
+from sprag_study.worker import models
+from sprag_study.worker.models import Parameter, machine_shaft
 
 _PHI_C_HELP: Final = (
     "which of the angles with T = T_mean S3 and S4 count from, from 0; by default the first where T rises"

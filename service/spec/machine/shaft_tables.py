@@ -5,14 +5,14 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from sprag.sentences import Sentence, Typed
-from sprag.service.reading.catalogue import range_sentence
-from sprag.service.reading.numbers import is_ambiguous, parse_number
-from sprag.service.reading.units import AmbiguousCommaError, QuantityError, has_unit, parse_exact, to_float
-from sprag.service.spec.csv_text import Column, in_cell, read_csv, refuse_mixed_column
-from sprag.service.spec.node import Node, exact
-from sprag.service.spec.table_text import heading_of
-from sprag.worker.models import Parameter, machine_shaft
+from sprag_study.sentences import Sentence, Typed
+from sprag_study.service.reading.catalogue import range_sentence
+from sprag_study.service.reading.numbers import is_ambiguous, parse_number
+from sprag_study.service.reading.units import AmbiguousCommaError, QuantityError, has_unit, parse_exact, to_float
+from sprag_study.service.spec.csv_text import Column, in_cell, read_csv, refuse_mixed_column
+from sprag_study.service.spec.node import Node, exact
+from sprag_study.service.spec.table_text import heading_of
+from sprag_study.worker.models import Parameter, machine_shaft
 
 #: The end of a heading that may be a unit: ``angle_deg``, ``angle deg``, ``angle / deg``.
 _LAST_WORD: Final = re.compile(r"[\s_/]([^\s_/]+)$")

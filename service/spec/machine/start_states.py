@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag.service.spec.derive import layout
-from sprag.worker.derived import blocks, involved
-from sprag.worker.models.vibration_drive.start_states import impossible_starts
+from sprag_study.service.spec.derive import layout
+from sprag_study.worker.derived import blocks, involved
+from sprag_study.worker.models.vibration_drive.start_states import impossible_starts
 
 if TYPE_CHECKING:
-    from sprag.service.spec.machine.machine import Machine
-    from sprag.service.spec.report import Report
-    from sprag.worker.study import Axis, Combine, Study
+    from sprag_study.service.spec.machine.machine import Machine
+    from sprag_study.service.spec.report import Report
+    from sprag_study.worker.study import Axis, Combine, Study
 
 _STATE = ".initial_clutch"
 #: Of a pendulum: what decides whether its clutch can begin in a state.

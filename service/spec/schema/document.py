@@ -1,16 +1,16 @@
 """The spec as a JSON Schema (2020-12), made from the engine's catalogue: for the API's description and for forms.
 
 The schema gives each field's name, unit, range, default and meaning. Rules that involve several fields (windows inside
-the run, sizes of grids, clutch laws) are checked by `sprag.service.spec.document.parse_spec` only.
+the run, sizes of grids, clutch laws) are checked by `sprag_study.service.spec.document.parse_spec` only.
 """
 
 from __future__ import annotations
 
-from sprag.service.spec.described import schema_of
-from sprag.service.spec.document import SPEC
-from sprag.service.spec.machine.registry import part_of
-from sprag.service.spec.schema.quantity import Schema, without_numbers
-from sprag.worker import models
+from sprag_study.service.spec.described import schema_of
+from sprag_study.service.spec.document import SPEC
+from sprag_study.service.spec.machine.registry import part_of
+from sprag_study.service.spec.schema.quantity import Schema, without_numbers
+from sprag_study.worker import models
 
 
 def spec_schema() -> Schema:

@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
-from sprag.service.reading.units import examples
-from sprag.worker.limits import MAX_QUANTITY_LENGTH
-from sprag.worker.models import Parameter
+from sprag_study.service.reading.units import examples
+from sprag_study.worker.limits import MAX_QUANTITY_LENGTH
+from sprag_study.worker.models import Parameter
 
 Schema = dict[str, Any]
 

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.service.storage.rows.hashes import as_kept
-from sprag.service.storage.tables import KEY_COLUMNS, further_table, results_table
-from sprag.worker import models
+from sprag_study.service.storage.rows.hashes import as_kept
+from sprag_study.service.storage.tables import KEY_COLUMNS, further_table, results_table
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
-    from sprag.worker.models import ChunkResult
+    from sprag_study.worker.models import ChunkResult
 
 #: Rows that are put together at once: fewer cost time each, more memory.
 MERGED_ROWS: Final = 1_000

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.storage.database.sqlite_files import sqlite_driver
+from sprag_study.service.storage.database.sqlite_files import sqlite_driver
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -15,7 +15,8 @@ LEAST_SECONDS: Final = 0.1
 
 
 class FileNews:
-    """Changes committed by any other connection, of this process or another. Implements `sprag.worker.ports.News`.
+    """Changes committed by any other connection, of this process or another. Implements
+    `sprag_study.worker.ports.News`.
 
     SQLite counts the commits that a connection has not made itself (``PRAGMA data_version``): asking takes
     microseconds, where reading the unfinished studies takes milliseconds.

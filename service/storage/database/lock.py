@@ -11,8 +11,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Protocol
 
-from sprag.service.storage.database.private_files import create_private
-from sprag.worker.pool.process_table import start_time
+from sprag_study.service.storage.database.private_files import create_private
+from sprag_study.worker.pool.process_table import start_time
 
 if TYPE_CHECKING:
     from collections.abc import Set as AbstractSet

@@ -17,7 +17,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.storage.errors import DatabaseError
+from sprag_study.service.storage.errors import DatabaseError
 
 if TYPE_CHECKING:
     from pathlib import Path

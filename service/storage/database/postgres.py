@@ -22,14 +22,14 @@ import psycopg
 import sqlalchemy as sa
 from sqlalchemy.engine import URL
 
-from sprag.service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError, busy
+from sprag_study.service.storage.errors import DatabaseBusyError, DatabaseError, DatabaseFullError, busy
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
-    from sprag.service.storage.database.blocks import Block, Target
+    from sprag_study.service.storage.database.blocks import Block, Target
 
 #: Signature, flags (none) and the length of the extension of the header (none).
 HEADER: Final = b"PGCOPY\n\xff\r\n\0" + struct.pack(">ii", 0, 0)

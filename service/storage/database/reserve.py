@@ -9,7 +9,7 @@ import os
 from contextlib import suppress
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.storage.database.private_files import create_private
+from sprag_study.service.storage.database.private_files import create_private
 
 if TYPE_CHECKING:
     from pathlib import Path

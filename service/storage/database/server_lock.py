@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import psycopg
 
-from sprag.service.storage.database.postgres import (
+from sprag_study.service.storage.database.postgres import (
     CHORES,
     EPOCHS,
     LOCKS,
@@ -18,7 +18,7 @@ from sprag.service.storage.database.postgres import (
     explained,
     location,
 )
-from sprag.service.storage.errors import DatabaseError
+from sprag_study.service.storage.errors import DatabaseError
 
 if TYPE_CHECKING:
     from collections.abc import Collection

@@ -15,17 +15,17 @@ from typing import TYPE_CHECKING, Any, TypeVar, TypeVarTuple
 import sqlalchemy as sa
 from sqlalchemy.engine import URL, make_url
 
-from sprag.service.storage.database import sqlite_files
-from sprag.service.storage.database.file_news import FileNews
-from sprag.service.storage.errors import DatabaseError, DatabaseFullError, EndingError, busy
+from sprag_study.service.storage.database import sqlite_files
+from sprag_study.service.storage.database.file_news import FileNews
+from sprag_study.service.storage.errors import DatabaseError, DatabaseFullError, EndingError, busy
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
     from types import ModuleType
 
-    from sprag.service.storage.database.blocks import Block, Target
-    from sprag.service.storage.database.server_lock import ServerLock
-    from sprag.worker.ports import News
+    from sprag_study.service.storage.database.blocks import Block, Target
+    from sprag_study.service.storage.database.server_lock import ServerLock
+    from sprag_study.worker.ports import News
 
 Args = TypeVarTuple("Args")
 R = TypeVar("R")
@@ -112,7 +112,7 @@ class Session:
 
     ``url`` is a SQLAlchemy URL of an SQLite file or of a database on a PostgreSQL server. Raises DatabaseError when it
     cannot be used. ``location`` is the database for display. Without ``create`` a file has to be there; ``alone``: no
-    other connection to the file may be open, on a server see `sprag.service.storage.alone`.
+    other connection to the file may be open, on a server see `sprag_study.service.storage.alone`.
     """
 
     def __init__(self, url: str, *, create: bool = True, alone: bool = False) -> None:
@@ -301,7 +301,7 @@ class Session:
     def server_lock(self, owner: str) -> ServerLock:
         """The presence of the dispatcher ``owner`` (a name for people) on a database server."""
         _postgres()
-        from sprag.service.storage.database.server_lock import ServerLock
+        from sprag_study.service.storage.database.server_lock import ServerLock
 
         return ServerLock(self.url, owner, BUSY_SECONDS)
 
@@ -325,10 +325,10 @@ class Session:
 def _postgres() -> ModuleType:
     """The module for servers; its driver is an optional dependency."""
     try:
-        from sprag.service.storage.database import postgres
+        from sprag_study.service.storage.database import postgres
     except ImportError:
         raise DatabaseError(
-            "PostgreSQL needs a driver that is not installed: pip install 'sprag[postgres]'", "missing-extra"
+            "PostgreSQL needs a driver that is not installed: pip install 'sprag-study[postgres]'", "missing-extra"
         ) from None
     return postgres
 

@@ -11,19 +11,26 @@ from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
-from sprag.service.storage.database.blocks import tuples
-from sprag.service.storage.database.one_name import HeldName, hold, linked
-from sprag.service.storage.database.private_files import PRIVATE_FOLDER_MODE, create_private
-from sprag.service.storage.database.reserve import spend_to_open
-from sprag.service.storage.errors import CREATED_BY, DatabaseBusyError, DatabaseError, DatabaseFullError, busy, in_use
-from sprag.worker.ports import StoreError
+from sprag_study.service.storage.database.blocks import tuples
+from sprag_study.service.storage.database.one_name import HeldName, hold, linked
+from sprag_study.service.storage.database.private_files import PRIVATE_FOLDER_MODE, create_private
+from sprag_study.service.storage.database.reserve import spend_to_open
+from sprag_study.service.storage.errors import (
+    CREATED_BY,
+    DatabaseBusyError,
+    DatabaseError,
+    DatabaseFullError,
+    busy,
+    in_use,
+)
+from sprag_study.worker.ports import StoreError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from sqlalchemy.engine import URL
 
-    from sprag.service.storage.database.blocks import Block, Target
+    from sprag_study.service.storage.database.blocks import Block, Target
 
 #: Older libraries can corrupt a write-ahead log that several connections share.
 SAFE_SQLITE: Final = (3, 51, 3)

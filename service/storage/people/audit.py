@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
-from sprag.service.actor import acting
-from sprag.service.faults import parameter_error
-from sprag.service.languages import N_
-from sprag.service.storage.errors import ChangedMeanwhileError, NotOwnerError, PageTokenError
-from sprag.service.storage.part import MAX_INTEGER, Part, micros_of, moment
-from sprag.service.storage.people.tables import AUDIT_LOG
+from sprag_study.service.actor import acting
+from sprag_study.service.faults import parameter_error
+from sprag_study.service.languages import N_
+from sprag_study.service.storage.errors import ChangedMeanwhileError, NotOwnerError, PageTokenError
+from sprag_study.service.storage.part import MAX_INTEGER, Part, micros_of, moment
+from sprag_study.service.storage.people.tables import AUDIT_LOG
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator

@@ -15,26 +15,26 @@ from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
-from sprag.sentences import Sentence
-from sprag.service.actor import Role, acting
-from sprag.service.faults import FaultError
-from sprag.service.languages import grouped, recorded
-from sprag.service.storage.components import COMPONENTS
-from sprag.service.storage.errors import TokenNotFoundError, UserExistsError, UserNotFoundError
-from sprag.service.storage.part import Part, micros_of, moment, optional_moment
-from sprag.service.storage.people.audit import note
-from sprag.service.storage.people.pools import pool_of
-from sprag.service.storage.people.scopes import TokenScope, TokenState
-from sprag.service.storage.people.tables import ENDED_SESSIONS, SESSION_KEY, TOKENS, USERS
-from sprag.service.storage.saved_views import SAVED_VIEWS
-from sprag.service.storage.schedules.tables import SCHEDULES
-from sprag.service.storage.tables import ENDED, HELD_AT_DEADLINE, STUDIES
+from sprag_study.sentences import Sentence
+from sprag_study.service.actor import Role, acting
+from sprag_study.service.faults import FaultError
+from sprag_study.service.languages import grouped, recorded
+from sprag_study.service.storage.components import COMPONENTS
+from sprag_study.service.storage.errors import TokenNotFoundError, UserExistsError, UserNotFoundError
+from sprag_study.service.storage.part import Part, micros_of, moment, optional_moment
+from sprag_study.service.storage.people.audit import note
+from sprag_study.service.storage.people.pools import pool_of
+from sprag_study.service.storage.people.scopes import TokenScope, TokenState
+from sprag_study.service.storage.people.tables import ENDED_SESSIONS, SESSION_KEY, TOKENS, USERS
+from sprag_study.service.storage.saved_views import SAVED_VIEWS
+from sprag_study.service.storage.schedules.tables import SCHEDULES
+from sprag_study.service.storage.tables import ENDED, HELD_AT_DEADLINE, STUDIES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from datetime import datetime
 
-    from sprag.service.settings import Settings
+    from sprag_study.service.settings import Settings
 
 _U = USERS.c
 #: The texts of a study, which people can make long.

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import sqlalchemy as sa
 
-from sprag.service.actor import Door, Role, acting
-from sprag.service.storage.people.tables import USERS
+from sprag_study.service.actor import Door, Role, acting
+from sprag_study.service.storage.people.tables import USERS
 
 _U = USERS.c
 

@@ -2,7 +2,7 @@
 
 import sqlalchemy as sa
 
-from sprag.service.storage.tables import METADATA
+from sprag_study.service.storage.tables import METADATA
 
 USERS = sa.Table(
     "users",
@@ -63,7 +63,7 @@ AUDIT_LOG = sa.Table(
     METADATA,
     sa.Column("number", sa.Integer, primary_key=True, autoincrement=True),
     sa.Column("at", sa.BigInteger, nullable=False, index=True),
-    # By which way the change came (`sprag.service.actor`).
+    # By which way the change came (`sprag_study.service.actor`).
     sa.Column("door", sa.String(16), nullable=False),
     sa.Column("actor", sa.String(200), nullable=False, index=True),
     sa.Column("token", sa.String(40)),

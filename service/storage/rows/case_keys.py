@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import sqlalchemy as sa
 
-from sprag.service.storage.part import MAX_INTEGER
-from sprag.worker import fingerprint
-from sprag.worker.case_keys import case_keys
+from sprag_study.service.storage.part import MAX_INTEGER
+from sprag_study.worker import fingerprint
+from sprag_study.worker.case_keys import case_keys
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
     Numbers = NDArray[np.int64]
 

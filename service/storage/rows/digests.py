@@ -1,6 +1,6 @@
 """Digests of rows: flipped bits in stored results are noticed, whatever the database thinks of its pages.
 
-Each finished chunk has the sum of the hashes of its rows (`sprag.service.storage.rows.hashes`).
+Each finished chunk has the sum of the hashes of its rows (`sprag_study.service.storage.rows.hashes`).
 """
 
 from __future__ import annotations
@@ -15,27 +15,27 @@ import numpy as np
 import sqlalchemy as sa
 from cachetools import TTLCache
 
-from sprag.service.storage.errors import DatabaseError
-from sprag.service.storage.part import Part, change_row, move_row, row_of
-from sprag.service.storage.people.audit import note
-from sprag.service.storage.rows.columns import as_number, conditions, records
-from sprag.service.storage.rows.hashes import as_kept, digest_of, row_words
-from sprag.service.storage.studies.round_table import rounds_of
-from sprag.service.storage.studies.study_digests import counts_differ, require_whole
-from sprag.service.storage.tables import CHUNKS, ENDINGS, STUDIES, further_table, results_table
-from sprag.worker import models
-from sprag.worker.ports import Chunk
-from sprag.worker.states import ChunkState, StudyEvent, StudyState
+from sprag_study.service.storage.errors import DatabaseError
+from sprag_study.service.storage.part import Part, change_row, move_row, row_of
+from sprag_study.service.storage.people.audit import note
+from sprag_study.service.storage.rows.columns import as_number, conditions, records
+from sprag_study.service.storage.rows.hashes import as_kept, digest_of, row_words
+from sprag_study.service.storage.studies.round_table import rounds_of
+from sprag_study.service.storage.studies.study_digests import counts_differ, require_whole
+from sprag_study.service.storage.tables import CHUNKS, ENDINGS, STUDIES, further_table, results_table
+from sprag_study.worker import models
+from sprag_study.worker.ports import Chunk
+from sprag_study.worker.states import ChunkState, StudyEvent, StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
-    from sprag.service.storage.database.session import Session
-    from sprag.service.storage.rows.hashes import Words
-    from sprag.service.storage.rows.order import Orders
-    from sprag.worker.ports import Clock
+    from sprag_study.service.storage.database.session import Session
+    from sprag_study.service.storage.rows.hashes import Words
+    from sprag_study.service.storage.rows.order import Orders
+    from sprag_study.worker.ports import Clock
 
 _LOG = logging.getLogger("sprag.digests")
 

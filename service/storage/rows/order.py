@@ -9,19 +9,19 @@ import numpy as np
 import sqlalchemy as sa
 from cachetools import LRUCache
 
-from sprag.service.storage.part import Part
-from sprag.service.storage.tables import CHUNKS, STUDIES
-from sprag.worker.order import coverage, order_of
-from sprag.worker.states import ChunkState
-from sprag.worker.study import Study
-from sprag.worker.sweeps import LineOrder
+from sprag_study.service.storage.part import Part
+from sprag_study.service.storage.tables import CHUNKS, STUDIES
+from sprag_study.worker.order import coverage, order_of
+from sprag_study.worker.states import ChunkState
+from sprag_study.worker.study import Study
+from sprag_study.worker.sweeps import LineOrder
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.storage.database.session import Session
-    from sprag.worker.order import Coverage, Order
-    from sprag.worker.ports import Chunk, Clock
+    from sprag_study.service.storage.database.session import Session
+    from sprag_study.worker.order import Coverage, Order
+    from sprag_study.worker.ports import Chunk, Clock
 
 #: Studies whose orders are kept in memory; each takes a few numbers per value of an axis, or of the list.
 _KEPT: Final = 16

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Final
 import sqlalchemy as sa
 from sqlalchemy.dialects import postgresql, sqlite
 
-from sprag.service.languages import _, grouped
-from sprag.service.storage.tables import FINGERPRINTS
-from sprag.worker import fingerprint
+from sprag_study.service.languages import _, grouped
+from sprag_study.service.storage.tables import FINGERPRINTS
+from sprag_study.worker import fingerprint
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -45,7 +45,7 @@ class Origin:
         `HOSTS_BETWEEN` between them. None where the cases were given up or hosts were not recorded, as before revision
         0022.
     fingerprint : str or None
-        Digest of the code and libraries of the process (`sprag.worker.fingerprint`); None where the
+        Digest of the code and libraries of the process (`sprag_study.worker.fingerprint`); None where the
         cases were given up, and for chunks from before revision 0022.
     chunks, cases : int
     differs : str or None

@@ -12,35 +12,43 @@ import numpy as np
 import sqlalchemy as sa
 from cachetools import LRUCache
 
-from sprag.sentences import Sentence, WarningText
-from sprag.service.storage.errors import DatabaseError, StudyNotFoundError
-from sprag.service.storage.part import Part
-from sprag.service.storage.rows.case_keys import KEYED, NOT_YET, TOO_MANY, add_keys, any_below, keys_of, newest_with
-from sprag.service.storage.rows.columns import conditions
-from sprag.service.storage.rows.origins import HOSTS_BETWEEN
-from sprag.service.storage.stored_sentences import read_warnings, write_warnings
-from sprag.service.storage.studies.round_table import latest_place
-from sprag.service.storage.studies.study_digests import WITH_DIGEST, is_sound, undecodable
-from sprag.service.storage.tables import CHUNKS, ENDINGS, KEY_COLUMNS, STUDIES, further_table, results_table
-from sprag.worker import fingerprint, models
-from sprag.worker.case_keys import case_keys
-from sprag.worker.models import WorkerEnding
-from sprag.worker.order import order_of
-from sprag.worker.ports import Known
-from sprag.worker.reuse import Wanted, kin_hash, shared_cases, span, taken
-from sprag.worker.states import ChunkState, StudyState
-from sprag.worker.study import Study
-from sprag.worker.sweeps import whole_lines
+from sprag_study.sentences import Sentence, WarningText
+from sprag_study.service.storage.errors import DatabaseError, StudyNotFoundError
+from sprag_study.service.storage.part import Part
+from sprag_study.service.storage.rows.case_keys import (
+    KEYED,
+    NOT_YET,
+    TOO_MANY,
+    add_keys,
+    any_below,
+    keys_of,
+    newest_with,
+)
+from sprag_study.service.storage.rows.columns import conditions
+from sprag_study.service.storage.rows.origins import HOSTS_BETWEEN
+from sprag_study.service.storage.stored_sentences import read_warnings, write_warnings
+from sprag_study.service.storage.studies.round_table import latest_place
+from sprag_study.service.storage.studies.study_digests import WITH_DIGEST, is_sound, undecodable
+from sprag_study.service.storage.tables import CHUNKS, ENDINGS, KEY_COLUMNS, STUDIES, further_table, results_table
+from sprag_study.worker import fingerprint, models
+from sprag_study.worker.case_keys import case_keys
+from sprag_study.worker.models import WorkerEnding
+from sprag_study.worker.order import order_of
+from sprag_study.worker.ports import Known
+from sprag_study.worker.reuse import Wanted, kin_hash, shared_cases, span, taken
+from sprag_study.worker.states import ChunkState, StudyState
+from sprag_study.worker.study import Study
+from sprag_study.worker.sweeps import whole_lines
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
-    from sprag.service.storage.database.session import Session
-    from sprag.service.storage.rows.digests import Digests
-    from sprag.service.storage.rows.order import Orders
-    from sprag.worker.ports import Chunk, Clock
+    from sprag_study.service.storage.database.session import Session
+    from sprag_study.service.storage.rows.digests import Digests
+    from sprag_study.service.storage.rows.order import Orders
+    from sprag_study.worker.ports import Chunk, Clock
 
     Cases = NDArray[np.int64]
 

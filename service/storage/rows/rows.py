@@ -12,26 +12,26 @@ import numpy as np
 import sqlalchemy as sa
 from cachetools import LRUCache
 
-from sprag.service.storage.part import MAX_INTEGER, Part, row_of
-from sprag.service.storage.rows.columns import RowColumns, as_number, conditions, records
-from sprag.service.storage.rows.digests import LOOKED_OVER
-from sprag.service.storage.rows.origins import CasesOf, Origin, differences_of
-from sprag.service.storage.studies.records import CaseColumns, CaseRow, Kinds, RowBlock
-from sprag.service.storage.tables import CHUNKS, ENDINGS, STUDIES, further_table, results_table
-from sprag.worker import models
-from sprag.worker.models import WorkerEnding, regime_info
-from sprag.worker.ports import Chunk
-from sprag.worker.states import ChunkState, StudyState
+from sprag_study.service.storage.part import MAX_INTEGER, Part, row_of
+from sprag_study.service.storage.rows.columns import RowColumns, as_number, conditions, records
+from sprag_study.service.storage.rows.digests import LOOKED_OVER
+from sprag_study.service.storage.rows.origins import CasesOf, Origin, differences_of
+from sprag_study.service.storage.studies.records import CaseColumns, CaseRow, Kinds, RowBlock
+from sprag_study.service.storage.tables import CHUNKS, ENDINGS, STUDIES, further_table, results_table
+from sprag_study.worker import models
+from sprag_study.worker.models import WorkerEnding, regime_info
+from sprag_study.worker.ports import Chunk
+from sprag_study.worker.states import ChunkState, StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
-    from sprag.service.storage.database.session import Session
-    from sprag.service.storage.rows.digests import Digests
-    from sprag.service.storage.rows.order import Orders
-    from sprag.worker.ports import Clock
+    from sprag_study.service.storage.database.session import Session
+    from sprag_study.service.storage.rows.digests import Digests
+    from sprag_study.service.storage.rows.order import Orders
+    from sprag_study.worker.ports import Clock
 
 #: Rows of one block of a stream.
 BLOCK_ROWS = 2_000

@@ -16,16 +16,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
-from sprag.service.delivery import origin_of
-from sprag.service.storage.part import Part, micros_of, moment, optional_moment
-from sprag.service.storage.people.audit import note
-from sprag.service.storage.schedules.tables import REPORTS, SCHEDULES
+from sprag_study.service.delivery import origin_of
+from sprag_study.service.storage.part import Part, micros_of, moment, optional_moment
+from sprag_study.service.storage.people.audit import note
+from sprag_study.service.storage.schedules.tables import REPORTS, SCHEDULES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from datetime import datetime
 
-    from sprag.service.schedules.report_to import ReportTo
+    from sprag_study.service.schedules.report_to import ReportTo
 
 _P, _S = REPORTS.c, SCHEDULES.c
 #: For so long a process may take to send a report before another one tries.

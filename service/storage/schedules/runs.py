@@ -10,31 +10,37 @@ from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
-from sprag.sentences import Sentence
-from sprag.service.answers import filled
-from sprag.service.answers.schedules import RunOutcome
-from sprag.service.json_text import timestamp
-from sprag.service.languages import recorded
-from sprag.service.schedules.outcomes import Outcome, Result
-from sprag.service.schedules.policies import CatchUp
-from sprag.service.schedules.report_to import ReportWhen
-from sprag.service.schedules.times import local_time
-from sprag.service.storage.errors import RunClosedError
-from sprag.service.storage.part import Part, micros_of, moment, optional_moment
-from sprag.service.storage.people.audit import edition_of, note
-from sprag.service.storage.people.tables import AUDIT_LOG
-from sprag.service.storage.saved_views import inherit_figures
-from sprag.service.storage.schedules.reports import add_reports
-from sprag.service.storage.schedules.tables import SCHEDULE_RUNS, SCHEDULES, fields_of, report_to_of, trouble_flags_of
-from sprag.service.storage.stored_sentences import sentence_in, written
-from sprag.service.storage.tables import CHUNKS, ENDED, GO_ON, HELD_AT_DEADLINE, STUDIES, WAITS_FOR_ROOM
-from sprag.worker.states import GOING, ChunkState, StudyState
+from sprag_study.sentences import Sentence
+from sprag_study.service.answers import filled
+from sprag_study.service.answers.schedules import RunOutcome
+from sprag_study.service.json_text import timestamp
+from sprag_study.service.languages import recorded
+from sprag_study.service.schedules.outcomes import Outcome, Result
+from sprag_study.service.schedules.policies import CatchUp
+from sprag_study.service.schedules.report_to import ReportWhen
+from sprag_study.service.schedules.times import local_time
+from sprag_study.service.storage.errors import RunClosedError
+from sprag_study.service.storage.part import Part, micros_of, moment, optional_moment
+from sprag_study.service.storage.people.audit import edition_of, note
+from sprag_study.service.storage.people.tables import AUDIT_LOG
+from sprag_study.service.storage.saved_views import inherit_figures
+from sprag_study.service.storage.schedules.reports import add_reports
+from sprag_study.service.storage.schedules.tables import (
+    SCHEDULE_RUNS,
+    SCHEDULES,
+    fields_of,
+    report_to_of,
+    trouble_flags_of,
+)
+from sprag_study.service.storage.stored_sentences import sentence_in, written
+from sprag_study.service.storage.tables import CHUNKS, ENDED, GO_ON, HELD_AT_DEADLINE, STUDIES, WAITS_FOR_ROOM
+from sprag_study.worker.states import GOING, ChunkState, StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.schedules.fields import ScheduleFields
-    from sprag.service.schedules.policies import DueTime
+    from sprag_study.service.schedules.fields import ScheduleFields
+    from sprag_study.service.schedules.policies import DueTime
 
 _S, _R, _C = SCHEDULES.c, SCHEDULE_RUNS.c, STUDIES.c
 #: Most due times that are looked at; there is one watchdog, and people read what it says.

@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
-from sprag.sentences import Sentence
-from sprag.service.actor import acting
-from sprag.service.languages import recorded
-from sprag.service.storage.deployment import ANY_SCHEDULE
-from sprag.service.storage.errors import IdempotencyConflictError, ScheduleNotFoundError, TooManySchedulesError
-from sprag.service.storage.part import Part, change_row, micros_of, moment, move_row, optional_moment
-from sprag.service.storage.people.audit import by_sender, note, require_edition, require_own
-from sprag.service.storage.people.pools import pool_of
-from sprag.service.storage.schedules.runs import RunRecord, ScheduleRecord, refuse_open_runs, runs_of
-from sprag.service.storage.schedules.tables import (
+from sprag_study.sentences import Sentence
+from sprag_study.service.actor import acting
+from sprag_study.service.languages import recorded
+from sprag_study.service.storage.deployment import ANY_SCHEDULE
+from sprag_study.service.storage.errors import IdempotencyConflictError, ScheduleNotFoundError, TooManySchedulesError
+from sprag_study.service.storage.part import Part, change_row, micros_of, moment, move_row, optional_moment
+from sprag_study.service.storage.people.audit import by_sender, note, require_edition, require_own
+from sprag_study.service.storage.people.pools import pool_of
+from sprag_study.service.storage.schedules.runs import RunRecord, ScheduleRecord, refuse_open_runs, runs_of
+from sprag_study.service.storage.schedules.tables import (
     SCHEDULE_RUNS,
     SCHEDULES,
     fields_of,
@@ -29,16 +29,16 @@ from sprag.service.storage.schedules.tables import (
     row_values,
     window_of,
 )
-from sprag.service.storage.tables import ENDED, STUDIES, WAITS_FOR_WINDOW
-from sprag.worker.limits import MAX_SCHEDULES
-from sprag.worker.states import StudyEvent, StudyState
+from sprag_study.service.storage.tables import ENDED, STUDIES, WAITS_FOR_WINDOW
+from sprag_study.worker.limits import MAX_SCHEDULES
+from sprag_study.worker.states import StudyEvent, StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Collection
     from datetime import datetime
 
-    from sprag.service.schedules.fields import ScheduleFields
-    from sprag.service.schedules.times import Window
+    from sprag_study.service.schedules.fields import ScheduleFields
+    from sprag_study.service.schedules.times import Window
 
 _S, _R = SCHEDULES.c, SCHEDULE_RUNS.c
 #: Number of latest runs reported for a schedule.

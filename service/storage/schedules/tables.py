@@ -1,6 +1,6 @@
 """The tables of schedules, and the fields of a schedule in a row of theirs.
 
-Times are microseconds since 1970-01-01 UTC, as in `sprag.service.storage.tables`.
+Times are microseconds since 1970-01-01 UTC, as in `sprag_study.service.storage.tables`.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import sqlalchemy as sa
 
-from sprag.service.delivery import origin_of
-from sprag.service.schedules.fields import ScheduleFields
-from sprag.service.schedules.policies import CatchUp, Overlap, Policies
-from sprag.service.schedules.report_to import ReportTo, ReportWhen
-from sprag.service.schedules.times import Timing, Window, read_time_of_day
-from sprag.service.storage.part import micros_of, optional_moment
-from sprag.service.storage.tables import METADATA
+from sprag_study.service.delivery import origin_of
+from sprag_study.service.schedules.fields import ScheduleFields
+from sprag_study.service.schedules.policies import CatchUp, Overlap, Policies
+from sprag_study.service.schedules.report_to import ReportTo, ReportWhen
+from sprag_study.service.schedules.times import Timing, Window, read_time_of_day
+from sprag_study.service.storage.part import micros_of, optional_moment
+from sprag_study.service.storage.tables import METADATA
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -46,13 +46,13 @@ SCHEDULES = sa.Table(
     # "06:00" on the wall clock of the zone, or a duration such as "8 h"; NULL where a run has no deadline.
     sa.Column("finish_by", sa.String(80)),
     # From the request that created the schedule; NULL where it had no key, or the schedule is deleted. Each sender has
-    # keys of its own (`sprag.service.actor.share_of`).
+    # keys of its own (`sprag_study.service.actor.share_of`).
     sa.Column("sender", sa.String(90), nullable=False, server_default=""),
     sa.Column("idempotency_key", sa.String(255)),
     sa.Column("body_hash", sa.String(64)),
     # Name of the user to whom it and its studies belong; NULL: to nobody.
     sa.Column("owner", sa.String(80)),
-    # See `sprag.service.schedules.policies`.
+    # See `sprag_study.service.schedules.policies`.
     sa.Column("overlap", sa.String(8), nullable=False, server_default="queue"),
     sa.Column("catch_up", sa.String(8), nullable=False, server_default="latest"),
     # A duration such as "30 min"; NULL where a due time may be run with any delay.
@@ -83,16 +83,16 @@ SCHEDULE_RUNS = sa.Table(
     # 1: somebody resumed the study outside its window, so the window no longer holds it.
     sa.Column("unbound", sa.Integer, nullable=False),
     sa.Column("problem", sa.Text),
-    # When the run was found to be over, and its outcome then, as JSON data (`sprag.service.schedules.outcomes`); the
-    # latter is NULL for runs from before revision 0025.
+    # When the run was found to be over, and its outcome then, as JSON data (`sprag_study.service.schedules.outcomes`);
+    # the latter is NULL for runs from before revision 0025.
     sa.Column("concluded_at", sa.BigInteger, index=True),
     sa.Column("outcome", sa.Text),
-    # The values of `problem` (`sprag.service.storage.stored_sentences`).
+    # The values of `problem` (`sprag_study.service.storage.stored_sentences`).
     sa.Column("problem_values", sa.Text),
     sa.Index("ix_schedule_runs_due", "due"),
 )
 
-#: Reports that are to be sent, were sent, or were given up (`sprag.service.storage.schedules.reports`).
+#: Reports that are to be sent, were sent, or were given up (`sprag_study.service.storage.schedules.reports`).
 REPORTS = sa.Table(
     "reports",
     METADATA,

@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
-from sprag.sentences import Sentence
-from sprag.service.answers.studies import StudyOrder
-from sprag.service.faults import Fault, FaultError
-from sprag.service.spec.labels import folded
-from sprag.service.storage.errors import PageTokenError
-from sprag.service.storage.part import MAX_INTEGER
-from sprag.service.storage.tables import STUDIES
-from sprag.worker.limits import MAX_TAGS
-from sprag.worker.states import StudyState
+from sprag_study.sentences import Sentence
+from sprag_study.service.answers.studies import StudyOrder
+from sprag_study.service.faults import Fault, FaultError
+from sprag_study.service.spec.labels import folded
+from sprag_study.service.storage.errors import PageTokenError
+from sprag_study.service.storage.part import MAX_INTEGER
+from sprag_study.service.storage.tables import STUDIES
+from sprag_study.worker.limits import MAX_TAGS
+from sprag_study.worker.states import StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from sprag.service.spec.labels import StudyChange
+    from sprag_study.service.spec.labels import StudyChange
 
 #: Between tags. No folded text has it, nor the line feed between name, tags and notes.
 _BESIDE_TAG: Final = "\x1f"

@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from sprag.service.storage.part import micros_of, optional_moment
-from sprag.service.storage.studies.records import Progress
-from sprag.service.storage.tables import COARSE_TO_FINE
-from sprag.worker import models
-from sprag.worker.states import StudyState
+from sprag_study.service.storage.part import micros_of, optional_moment
+from sprag_study.service.storage.studies.records import Progress
+from sprag_study.service.storage.tables import COARSE_TO_FINE
+from sprag_study.worker import models
+from sprag_study.worker.states import StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from sprag.service.storage.studies.records import RoundProgress
-    from sprag.worker.order import Coverage
+    from sprag_study.service.storage.studies.records import RoundProgress
+    from sprag_study.worker.order import Coverage
 
     Times = NDArray[np.float64]
 
@@ -127,7 +127,7 @@ def estimate(
     cases_done : int, optional
         Cases with an ending; those of ``recent`` unless given.
     sampled : bool
-        Whether the finished cases are spread among the remaining ones (`sprag.worker.order`).
+        Whether the finished cases are spread among the remaining ones (`sprag_study.worker.order`).
     uneven : bool
         Whether the cost of cases differs many times, as that of settled motions does.
     """

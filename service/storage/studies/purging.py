@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Final
 
 import sqlalchemy as sa
 
-from sprag.service.storage.errors import DatabaseFullError, StudyBusyError, StudyNotFoundError
-from sprag.service.storage.part import Part, makes_room, micros_of
-from sprag.service.storage.rows.case_keys import KEYED
-from sprag.service.storage.saved_views import SAVED_VIEWS
-from sprag.service.storage.tables import (
+from sprag_study.service.storage.errors import DatabaseFullError, StudyBusyError, StudyNotFoundError
+from sprag_study.service.storage.part import Part, makes_room, micros_of
+from sprag_study.service.storage.rows.case_keys import KEYED
+from sprag_study.service.storage.saved_views import SAVED_VIEWS
+from sprag_study.service.storage.tables import (
     CASE_KEYS,
     CHUNKS,
     ENDED,
@@ -23,16 +23,16 @@ from sprag.service.storage.tables import (
     further_table,
     results_table,
 )
-from sprag.worker.case_keys import case_keys
-from sprag.worker.study import Study
+from sprag_study.worker.case_keys import case_keys
+from sprag_study.worker.study import Study
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from datetime import datetime
 
-    from sprag.service.storage.database.session import Session
-    from sprag.service.storage.studies.studies import Studies
-    from sprag.worker.ports import Clock
+    from sprag_study.service.storage.database.session import Session
+    from sprag_study.service.storage.studies.studies import Studies
+    from sprag_study.worker.ports import Clock
 
 #: Rows deleted in one transaction: other writers wait for it.
 PURGED_ROWS: Final = 5_000

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sprag.service.storage.part import moment, optional_moment
-from sprag.service.storage.people.audit import edition_of
-from sprag.service.storage.stored_sentences import read_warnings, sentence_in
-from sprag.service.storage.tables import COARSE_TO_FINE, HELD_AT_DEADLINE
-from sprag.worker.states import StudyState
+from sprag_study.service.storage.part import moment, optional_moment
+from sprag_study.service.storage.people.audit import edition_of
+from sprag_study.service.storage.stored_sentences import read_warnings, sentence_in
+from sprag_study.service.storage.tables import COARSE_TO_FINE, HELD_AT_DEADLINE
+from sprag_study.worker.states import StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     import sqlalchemy as sa
     from numpy.typing import NDArray
 
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.order import Coverage
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.order import Coverage
 
 
 @dataclass(frozen=True, slots=True)
@@ -266,14 +266,14 @@ class DispatcherRecord:
     owner : str
         Its host and process.
     fingerprint : str
-        Of its process and of all its workers (`sprag.worker.fingerprint`); "" where it was not recorded.
+        Of its process and of all its workers (`sprag_study.worker.fingerprint`); "" where it was not recorded.
     started_at, heartbeat_at : datetime
     ended_at : datetime or None
         None while it is at work.
     silent : bool
         Whether the last heartbeat is older than `SILENT_SECONDS`, so that the workers are not known.
     report : Mapping[str, Any] or None
-        `sprag.worker.reports.Reporter.summary`; None before its first heartbeat.
+        `sprag_study.worker.reports.Reporter.summary`; None before its first heartbeat.
     studies : int
         Studies that belong to it.
     differs : str or None

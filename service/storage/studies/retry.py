@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sqlalchemy as sa
 
-from sprag.service.storage.errors import NothingToRetryError
-from sprag.service.storage.rows.columns import conditions
-from sprag.service.storage.tables import CHUNKS, ENDINGS, STUDIES, results_table
-from sprag.worker import models
-from sprag.worker.chunking import MAX_CHUNKS
-from sprag.worker.ports import Chunk
-from sprag.worker.states import ChunkState
-from sprag.worker.sweeps import LineOrder
+from sprag_study.service.storage.errors import NothingToRetryError
+from sprag_study.service.storage.rows.columns import conditions
+from sprag_study.service.storage.tables import CHUNKS, ENDINGS, STUDIES, results_table
+from sprag_study.worker import models
+from sprag_study.worker.chunking import MAX_CHUNKS
+from sprag_study.worker.ports import Chunk
+from sprag_study.worker.states import ChunkState
+from sprag_study.worker.sweeps import LineOrder
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
 
     from numpy.typing import NDArray
 
-    from sprag.worker.order import Order
+    from sprag_study.worker.order import Order
 
     Cases = NDArray[np.int64]
     #: Whether a chunk has the rows with that digest.

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
-from sprag.service.storage.errors import DatabaseError
-from sprag.service.storage.part import moment
-from sprag.service.storage.studies.records import RoundRecord
-from sprag.service.storage.studies.study_digests import changed, undecodable
-from sprag.service.storage.tables import ROUNDS, STUDIES
+from sprag_study.service.storage.errors import DatabaseError
+from sprag_study.service.storage.part import moment
+from sprag_study.service.storage.studies.records import RoundRecord
+from sprag_study.service.storage.studies.study_digests import changed, undecodable
+from sprag_study.service.storage.tables import ROUNDS, STUDIES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

@@ -15,19 +15,19 @@ import numpy as np
 import sqlalchemy as sa
 from cachetools import LRUCache
 
-from sprag.sentences import Sentence
-from sprag.service.actor import acting
-from sprag.service.answers.studies import StudyOrder
-from sprag.service.languages import recorded
-from sprag.service.spec.labels import folded
-from sprag.service.storage.errors import (
+from sprag_study.sentences import Sentence
+from sprag_study.service.actor import acting
+from sprag_study.service.answers.studies import StudyOrder
+from sprag_study.service.languages import recorded
+from sprag_study.service.spec.labels import folded
+from sprag_study.service.storage.errors import (
     IdempotencyConflictError,
     NothingToRetryError,
     StudyBusyError,
     StudyEndedError,
     StudyNotFoundError,
 )
-from sprag.service.storage.part import (
+from sprag_study.service.storage.part import (
     SILENT_SECONDS,
     Part,
     add_chunks,
@@ -41,14 +41,14 @@ from sprag.service.storage.part import (
     move_row,
     row_of,
 )
-from sprag.service.storage.people.audit import by_sender, note, require_edition, require_own
-from sprag.service.storage.people.people import STUDY_BYTES, TEXTS, require_queue, size_of_texts
-from sprag.service.storage.people.pools import rank_of
-from sprag.service.storage.rows.case_keys import KEYED, NOT_YET, TOO_MANY, add_keys
-from sprag.service.storage.rows.reuse import endings_of
-from sprag.service.storage.schedules.runs import submit_run
-from sprag.service.storage.schedules.schedules import lift_window
-from sprag.service.storage.studies.listing import (
+from sprag_study.service.storage.people.audit import by_sender, note, require_edition, require_own
+from sprag_study.service.storage.people.people import STUDY_BYTES, TEXTS, require_queue, size_of_texts
+from sprag_study.service.storage.people.pools import rank_of
+from sprag_study.service.storage.rows.case_keys import KEYED, NOT_YET, TOO_MANY, add_keys
+from sprag_study.service.storage.rows.reuse import endings_of
+from sprag_study.service.storage.schedules.runs import submit_run
+from sprag_study.service.storage.schedules.schedules import lift_window
+from sprag_study.service.storage.studies.listing import (
     MAX_PAGE,
     StudyFilter,
     changed_tags,
@@ -57,13 +57,19 @@ from sprag.service.storage.studies.listing import (
     sort_key,
     token_of,
 )
-from sprag.service.storage.studies.progress import RECENT_CHUNKS, progress_of
-from sprag.service.storage.studies.records import Progress, RoundProgress, StudyPage, StudyRecord, record_of
-from sprag.service.storage.studies.retry import failed_cases, failed_places, failed_runs, give_back, nothing_to_retry
-from sprag.service.storage.studies.round_table import add_round, latest_round, rounds_of
-from sprag.service.storage.studies.study_digests import WITH_DIGEST, digest_of_study, require_as_stored
-from sprag.service.storage.studies.study_row import study_row
-from sprag.service.storage.tables import (
+from sprag_study.service.storage.studies.progress import RECENT_CHUNKS, progress_of
+from sprag_study.service.storage.studies.records import Progress, RoundProgress, StudyPage, StudyRecord, record_of
+from sprag_study.service.storage.studies.retry import (
+    failed_cases,
+    failed_places,
+    failed_runs,
+    give_back,
+    nothing_to_retry,
+)
+from sprag_study.service.storage.studies.round_table import add_round, latest_round, rounds_of
+from sprag_study.service.storage.studies.study_digests import WITH_DIGEST, digest_of_study, require_as_stored
+from sprag_study.service.storage.studies.study_row import study_row
+from sprag_study.service.storage.tables import (
     CHUNKS,
     COARSE_TO_FINE,
     ENDED,
@@ -73,27 +79,27 @@ from sprag.service.storage.tables import (
     RECORD_COLUMNS,
     STUDIES,
 )
-from sprag.service.storage.work.dispatchers import dispatcher_of
-from sprag.worker.chunking import spans
-from sprag.worker.limits import MAX_AXIS_VALUES, MAX_WAITING_STUDIES
-from sprag.worker.ports import Chunk
-from sprag.worker.states import ChunkState, StudyEvent, StudyState, follow
-from sprag.worker.study import Study
-from sprag.worker.sweeps import LineOrder
+from sprag_study.service.storage.work.dispatchers import dispatcher_of
+from sprag_study.worker.chunking import spans
+from sprag_study.worker.limits import MAX_AXIS_VALUES, MAX_WAITING_STUDIES
+from sprag_study.worker.ports import Chunk
+from sprag_study.worker.states import ChunkState, StudyEvent, StudyState, follow
+from sprag_study.worker.study import Study
+from sprag_study.worker.sweeps import LineOrder
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
     from datetime import datetime
 
-    from sprag.service.spec.labels import StudyChange
-    from sprag.service.storage.database.session import Session
-    from sprag.service.storage.people.people import People
-    from sprag.service.storage.rows.digests import Digests
-    from sprag.service.storage.rows.order import Orders
-    from sprag.service.storage.schedules.runs import OpenRun
-    from sprag.service.storage.studies.records import RoundRecord
-    from sprag.service.storage.work.dispatchers import Dispatchers
-    from sprag.worker.ports import Clock
+    from sprag_study.service.spec.labels import StudyChange
+    from sprag_study.service.storage.database.session import Session
+    from sprag_study.service.storage.people.people import People
+    from sprag_study.service.storage.rows.digests import Digests
+    from sprag_study.service.storage.rows.order import Orders
+    from sprag_study.service.storage.schedules.runs import OpenRun
+    from sprag_study.service.storage.studies.records import RoundRecord
+    from sprag_study.service.storage.work.dispatchers import Dispatchers
+    from sprag_study.worker.ports import Clock
 
 #: Studies kept in memory after reading, as many as a list has and more, and the total number of their axis values,
 #: 8 bytes each.
@@ -126,7 +132,7 @@ class Studies(Part):
         )
         self._lock = Lock()
         self._reading = RLock()
-        #: Set when a study is deleted, for `sprag.service.jobs.housekeeping`.
+        #: Set when a study is deleted, for `sprag_study.service.jobs.housekeeping`.
         self.deleted = Event()
 
     def create(

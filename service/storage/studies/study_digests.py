@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
-from sprag.service.storage.errors import DatabaseError
-from sprag.service.storage.part import row_of
-from sprag.service.storage.tables import CHUNKS, ENDINGS, STUDIES, results_table
-from sprag.worker import models
-from sprag.worker.states import ChunkState, StudyState
+from sprag_study.service.storage.errors import DatabaseError
+from sprag_study.service.storage.part import row_of
+from sprag_study.service.storage.tables import CHUNKS, ENDINGS, STUDIES, results_table
+from sprag_study.worker import models
+from sprag_study.worker.states import ChunkState, StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

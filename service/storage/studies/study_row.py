@@ -5,18 +5,18 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.storage.rows.case_keys import keys_of
-from sprag.service.storage.stored_sentences import write_warnings
-from sprag.service.storage.tables import LINE_BY_LINE
-from sprag.worker import models
-from sprag.worker.planning import planner_of
-from sprag.worker.reuse import kin_hash
+from sprag_study.service.storage.rows.case_keys import keys_of
+from sprag_study.service.storage.stored_sentences import write_warnings
+from sprag_study.service.storage.tables import LINE_BY_LINE
+from sprag_study.worker import models
+from sprag_study.worker.planning import planner_of
+from sprag_study.worker.reuse import kin_hash
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from sprag.worker.chunking import Chunking
-    from sprag.worker.study import Study
+    from sprag_study.worker.chunking import Chunking
+    from sprag_study.worker.study import Study
 
 
 def study_row(

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import sqlalchemy as sa
 from sqlalchemy.dialects import postgresql, sqlite
 
-from sprag.service.storage.tables import CHUNKS, ENDINGS
+from sprag_study.service.storage.tables import CHUNKS, ENDINGS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from sprag.worker.ports import Chunk
-    from sprag.worker.states import ChunkState
+    from sprag_study.worker.ports import Chunk
+    from sprag_study.worker.states import ChunkState
 
     #: What identifies a chunk in the database: study, first position, number of cases.
     Key = tuple[int, int, int]

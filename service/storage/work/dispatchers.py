@@ -13,23 +13,31 @@ from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
-from sprag.sentences import Sentence
-from sprag.service.storage.part import SILENT_SECONDS, Part, announce, micros_of, moment, move_row, optional_moment
-from sprag.service.storage.rows.origins import differences_of, remember
-from sprag.service.storage.studies.records import DispatcherRecord
-from sprag.service.storage.tables import CHUNKS, DISPATCHERS, ENDED, STUDIES
-from sprag.worker import fingerprint
-from sprag.worker.ports import EpochLostError, Peer
-from sprag.worker.states import ChunkState, StudyEvent, StudyState
+from sprag_study.sentences import Sentence
+from sprag_study.service.storage.part import (
+    SILENT_SECONDS,
+    Part,
+    announce,
+    micros_of,
+    moment,
+    move_row,
+    optional_moment,
+)
+from sprag_study.service.storage.rows.origins import differences_of, remember
+from sprag_study.service.storage.studies.records import DispatcherRecord
+from sprag_study.service.storage.tables import CHUNKS, DISPATCHERS, ENDED, STUDIES
+from sprag_study.worker import fingerprint
+from sprag_study.worker.ports import EpochLostError, Peer
+from sprag_study.worker.states import ChunkState, StudyEvent, StudyState
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
     from datetime import datetime
 
-    from sprag.service.storage.database.lock import Presence
-    from sprag.service.storage.database.session import Session
-    from sprag.worker.chunking import Chunking
-    from sprag.worker.ports import Clock
+    from sprag_study.service.storage.database.lock import Presence
+    from sprag_study.service.storage.database.session import Session
+    from sprag_study.worker.chunking import Chunking
+    from sprag_study.worker.ports import Clock
 
 #: Separator between process and study in the name of an owner that runs a single study.
 _RUNS: Final = " runs "
@@ -212,7 +220,7 @@ class Dispatchers(Part):
             announce(connection)
 
     def heartbeat(self, epoch: int, report: Mapping[str, Any]) -> None:
-        """Record that the dispatcher is alive, and the report of its workers (`sprag.worker.reports`)."""
+        """Record that the dispatcher is alive, and the report of its workers (`sprag_study.worker.reports`)."""
         with self.session.write_own() as connection:
             require_epoch(connection, epoch)
             mine = sa.update(DISPATCHERS).where(DISPATCHERS.c.epoch == epoch)

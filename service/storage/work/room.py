@@ -13,20 +13,20 @@ from typing import TYPE_CHECKING
 
 import sqlalchemy as sa
 
-from sprag.sentences import Amount, Sentence
-from sprag.service.languages import recorded
-from sprag.service.storage.database.reserve import keep_reserve
-from sprag.service.storage.errors import DatabaseFullError
-from sprag.service.storage.part import Part, change_row, holds, move_row
-from sprag.service.storage.stored_sentences import sentence_in
-from sprag.service.storage.tables import STUDIES, WAITS_FOR_ROOM
-from sprag.service.storage.work.dispatchers import require_epoch, return_claims
-from sprag.worker.states import GOING, StudyEvent
+from sprag_study.sentences import Amount, Sentence
+from sprag_study.service.languages import recorded
+from sprag_study.service.storage.database.reserve import keep_reserve
+from sprag_study.service.storage.errors import DatabaseFullError
+from sprag_study.service.storage.part import Part, change_row, holds, move_row
+from sprag_study.service.storage.stored_sentences import sentence_in
+from sprag_study.service.storage.tables import STUDIES, WAITS_FOR_ROOM
+from sprag_study.service.storage.work.dispatchers import require_epoch, return_claims
+from sprag_study.worker.states import GOING, StudyEvent
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from sprag.service.storage.database.session import Session
+    from sprag_study.service.storage.database.session import Session
 
 #: Bytes kept free for the running chunks and for recording the reason of a hold.
 RESERVE_BYTES = 4 * 1024 * 1024

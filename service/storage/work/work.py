@@ -10,18 +10,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 import sqlalchemy as sa
 
-from sprag.sentences import Sentence
-from sprag.service.languages import grouped, recorded
-from sprag.service.storage.database.blocks import Block, Target, block, further_block, further_target, merged, target
-from sprag.service.storage.errors import DatabaseError
-from sprag.service.storage.part import Part, add_chunks, change_row, makes_room, moment, move_row, optional_moment
-from sprag.service.storage.rows.case_keys import KEYED, add_keys
-from sprag.service.storage.rows.hashes import digests_of, row_words, signed
-from sprag.service.storage.rows.origins import names_of
-from sprag.service.storage.rows.reuse import copy_rows, endings_of, mark_origin
-from sprag.service.storage.studies.round_table import add_round, latest_place
-from sprag.service.storage.studies.study_digests import WITH_DIGEST, grown_digest, problem_of, readable
-from sprag.service.storage.tables import (
+from sprag_study.sentences import Sentence
+from sprag_study.service.languages import grouped, recorded
+from sprag_study.service.storage.database.blocks import (
+    Block,
+    Target,
+    block,
+    further_block,
+    further_target,
+    merged,
+    target,
+)
+from sprag_study.service.storage.errors import DatabaseError
+from sprag_study.service.storage.part import Part, add_chunks, change_row, makes_room, moment, move_row, optional_moment
+from sprag_study.service.storage.rows.case_keys import KEYED, add_keys
+from sprag_study.service.storage.rows.hashes import digests_of, row_words, signed
+from sprag_study.service.storage.rows.origins import names_of
+from sprag_study.service.storage.rows.reuse import copy_rows, endings_of, mark_origin
+from sprag_study.service.storage.studies.round_table import add_round, latest_place
+from sprag_study.service.storage.studies.study_digests import WITH_DIGEST, grown_digest, problem_of, readable
+from sprag_study.service.storage.tables import (
     CHUNKS,
     ENDED,
     ENDINGS,
@@ -31,32 +39,39 @@ from sprag.service.storage.tables import (
     STUDIES,
     WAITS_FOR_ROOM,
 )
-from sprag.service.storage.work.chunks import add_endings, change_chunks, finish_chunks, in_state, is_chunk, key_of
-from sprag.service.storage.work.dispatchers import WAITING, may_change, require_epoch, return_claims
-from sprag.worker import fingerprint, models
-from sprag.worker.case_keys import case_keys
-from sprag.worker.chunking import spans
-from sprag.worker.models import ChunkResult
-from sprag.worker.planning.rounds import Rows as RoundRows
-from sprag.worker.ports import ActiveStudy, Chunk, Finished, UnreadableStudyError
-from sprag.worker.reuse import taken
-from sprag.worker.states import GOING, ChunkState, StudyEvent, StudyState
-from sprag.worker.study import Study
+from sprag_study.service.storage.work.chunks import (
+    add_endings,
+    change_chunks,
+    finish_chunks,
+    in_state,
+    is_chunk,
+    key_of,
+)
+from sprag_study.service.storage.work.dispatchers import WAITING, may_change, require_epoch, return_claims
+from sprag_study.worker import fingerprint, models
+from sprag_study.worker.case_keys import case_keys
+from sprag_study.worker.chunking import spans
+from sprag_study.worker.models import ChunkResult
+from sprag_study.worker.planning.rounds import Rows as RoundRows
+from sprag_study.worker.ports import ActiveStudy, Chunk, Finished, UnreadableStudyError
+from sprag_study.worker.reuse import taken
+from sprag_study.worker.states import GOING, ChunkState, StudyEvent, StudyState
+from sprag_study.worker.study import Study
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from typing import Any
 
-    from sprag.service.storage.database.session import Session
-    from sprag.service.storage.rows.digests import Digests
-    from sprag.service.storage.rows.hashes import Words
-    from sprag.service.storage.rows.order import Orders
-    from sprag.service.storage.rows.reuse import Reuse
-    from sprag.service.storage.rows.rows import Rows
-    from sprag.service.storage.work.chunks import Key
-    from sprag.service.storage.work.dispatchers import Dispatchers
-    from sprag.service.storage.work.room import Room
-    from sprag.worker.ports import Clock, Known
+    from sprag_study.service.storage.database.session import Session
+    from sprag_study.service.storage.rows.digests import Digests
+    from sprag_study.service.storage.rows.hashes import Words
+    from sprag_study.service.storage.rows.order import Orders
+    from sprag_study.service.storage.rows.reuse import Reuse
+    from sprag_study.service.storage.rows.rows import Rows
+    from sprag_study.service.storage.work.chunks import Key
+    from sprag_study.service.storage.work.dispatchers import Dispatchers
+    from sprag_study.service.storage.work.room import Room
+    from sprag_study.worker.ports import Clock, Known
 
 _C = STUDIES.c
 #: Asked at each poll; building the statement anew takes longer than running it.
@@ -105,7 +120,7 @@ class _Gain:
 
 
 class Work(Part):
-    """Studies, claims and results as the dispatcher sees them: `sprag.worker.ports.Store`."""
+    """Studies, claims and results as the dispatcher sees them: `sprag_study.worker.ports.Store`."""
 
     def __init__(
         self,

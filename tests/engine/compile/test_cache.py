@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from sprag.engine.compile import cache
+from sprag_study.engine.compile import cache
 
 #: Another user than this one and root.
 OTHER = 12_345

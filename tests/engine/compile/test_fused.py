@@ -8,8 +8,8 @@ import numba
 import numpy as np
 import pytest
 
-from sprag.engine.compile import lowering, plain
-from sprag.engine.compile.fused import fused
+from sprag_study.engine.compile import lowering, plain
+from sprag_study.engine.compile.fused import fused
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,8 @@ from typing import Any, cast
 import numba
 import pytest
 
-from sprag.engine.compile.jit import compiled, inlined, part
-from sprag.engine.compile.program import ProgramCompiler
+from sprag_study.engine.compile.jit import compiled, inlined, part
+from sprag_study.engine.compile.program import ProgramCompiler
 
 
 @part

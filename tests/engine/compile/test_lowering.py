@@ -11,11 +11,11 @@ import numba
 import numpy as np
 import pytest
 
-from sprag.engine.compile.decorators import unmanaged
-from sprag.engine.compile.lowering import constant_record, constant_shape, lane_loops, lane_mask, lowest
-from sprag.engine.compile.ways import GROUP
-from sprag.engine.taylor.batch import aligned_zeros
-from sprag.engine.taylor.straight import (
+from sprag_study.engine.compile.decorators import unmanaged
+from sprag_study.engine.compile.lowering import constant_record, constant_shape, lane_loops, lane_mask, lowest
+from sprag_study.engine.compile.ways import GROUP
+from sprag_study.engine.taylor.batch import aligned_zeros
+from sprag_study.engine.taylor.straight import (
     LaneCode,
     Span,
     exp2,

@@ -19,7 +19,7 @@ import pytest
 from numba.core import cgutils, types
 from numba.core.registry import cpu_target
 
-from sprag.engine.compile import decorators, lowering, plain, program
+from sprag_study.engine.compile import decorators, lowering, plain, program
 
 COMPILE = Path(program.__file__).parent
 

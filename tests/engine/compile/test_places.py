@@ -11,15 +11,15 @@ from pathlib import Path
 import pytest
 from numba.core.caching import UserProvidedCacheLocator
 
-from sprag.engine.compile import jit, places
-from sprag.engine.sources import engine_folder
+from sprag_study.engine.compile import jit, places
+from sprag_study.engine.sources import engine_folder
 from tests.conftest import ROOT
 
 #: Compiles a short function or loads it, and says which.
 _PROGRAM = """\
 import json
 import numpy as np
-from sprag.engine.machine_shaft import kernels
+from sprag_study.engine.machine_shaft import kernels
 value = kernels.series_value(np.array([1.0, 2.0, 3.0]), 3, 2.0)
 stats = kernels.series_value.stats
 print(json.dumps([kernels.__file__, value, sum(stats.cache_misses.values()), sum(stats.cache_hits.values())]))
@@ -39,7 +39,7 @@ def ask(folder: Path, cache: Path) -> list[object]:
 def test_a_second_installation_compiles_nothing(tmp_path: Path) -> None:
     second = tmp_path / "second"
     second.mkdir()
-    (second / "sprag").symlink_to(ROOT / "sprag")
+    (second / "sprag_study").symlink_to(ROOT / "sprag_study")
     first_file, value, *compiled = ask(ROOT, tmp_path / "cache")
     second_file, again, *loaded = ask(second, tmp_path / "cache")
     assert (value, again) == (21.5, 21.5)  # 1 + 2 P1(2) + 3 P2(2), with P1(2) = 2 and P2(2) = 5.5

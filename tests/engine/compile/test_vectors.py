@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from sprag.engine.compile import vectors
+from sprag_study.engine.compile import vectors
 
 
 class _Features(dict[str, bool]):

@@ -20,13 +20,13 @@ _PROGRAM = """
 import sys
 import numba
 import numpy as np
-from sprag.engine.compile.jit import constant_record, constant_shape, lane_loops, lane_mask, unmanaged
-from sprag.engine.taylor.batch import ROWS, SLOTS, aligned_zeros, peaks_loop, roots_loop
-from sprag.engine.taylor.roots import work_stack
-from sprag.engine.vibration_drive.advance import advance_loop
-from sprag.engine.vibration_drive.bounds import bounds_loop
-from sprag.engine.vibration_drive.equations import series_loop
-from sprag.engine.vibration_drive.layout import as_record, make_layout
+from sprag_study.engine.compile.jit import constant_record, constant_shape, lane_loops, lane_mask, unmanaged
+from sprag_study.engine.taylor.batch import ROWS, SLOTS, aligned_zeros, peaks_loop, roots_loop
+from sprag_study.engine.taylor.roots import work_stack
+from sprag_study.engine.vibration_drive.advance import advance_loop
+from sprag_study.engine.vibration_drive.bounds import bounds_loop
+from sprag_study.engine.vibration_drive.equations import series_loop
+from sprag_study.engine.vibration_drive.layout import as_record, make_layout
 from tests.engine.taylor.polynomials import first_root, largest
 
 LAYOUT = make_layout(1, 4, 6, 8)
@@ -56,7 +56,7 @@ for _ in range(50):
     g = rng.normal(size=7)
     g[0] = abs(g[0])
     found.append(np.array([first_root(g, 6, work_stack()), largest(g, 6, 0.1, work_stack())]))
-inside = [name for name in ("decorators", "lowering", "program") if f"sprag.engine.compile.{name}" in sys.modules]
+inside = [name for name in ("decorators", "lowering", "program") if f"sprag_study.engine.compile.{name}" in sys.modules]
 values = np.concatenate(found)
 values[np.isnan(values)] = 7.0  # which NaN it is has no meaning
 sys.stdout.write(f"{inside} {np.isfinite(values).mean() > 0.9} {values.tobytes().hex()}")
@@ -92,6 +92,6 @@ def test_an_unknown_way_is_refused_by_name() -> None:
 
 def test_the_ways_share_no_cache(tmp_path: Path) -> None:
     """numba would load code of one way into a process of the other."""
-    ask = "from sprag.engine.compile.cache import cache_folder; print(cache_folder())"
+    ask = "from sprag_study.engine.compile.cache import cache_folder; print(cache_folder())"
     folders = {output(ask, SPRAG_COMPILER=way, SPRAG_KERNEL_CACHE=str(tmp_path)) for way in WAYS}
     assert len(folders) == 2

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate._ivp import dop853_coefficients as dop853
 
-from sprag.engine.continuation.problem import Pattern
+from sprag_study.engine.continuation.problem import Pattern
 
 Floats = NDArray[np.float64]
 

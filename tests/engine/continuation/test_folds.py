@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, root
 
-from sprag.engine.continuation.follow import Range, follow
-from sprag.engine.continuation.problem import Branch, End, Kind
+from sprag_study.engine.continuation.follow import Range, follow
+from sprag_study.engine.continuation.problem import Branch, End, Kind
 from tests.engine.continuation.problems import Duffing, Halved, Impact
 
 Floats = NDArray[np.float64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sprag.engine.continuation.linear import eigenvalues, solve
+from sprag_study.engine.continuation.linear import eigenvalues, solve
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 6, 17])

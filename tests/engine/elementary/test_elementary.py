@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sprag.engine import elementary
+from sprag_study.engine import elementary
 
 Floats = NDArray[np.float64]
 

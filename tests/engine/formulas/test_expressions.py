@@ -9,8 +9,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sprag.engine.formulas.expressions import MAX_DEPTH, MAX_LENGTH, MAX_NODES, RESERVED, Expression, ExpressionError
-from sprag.engine.machine_shaft.operations import formula_breaks
+from sprag_study.engine.formulas.expressions import (
+    MAX_DEPTH,
+    MAX_LENGTH,
+    MAX_NODES,
+    RESERVED,
+    Expression,
+    ExpressionError,
+)
+from sprag_study.engine.machine_shaft.operations import formula_breaks
 
 PHI = np.linspace(0.1, 6.2, 64)
 

@@ -8,10 +8,10 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.machine_shaft.results import result_infos
-from sprag.engine.machine_shaft.simulate import simulate
-from sprag.engine.machine_shaft.spec import MachineSpec, MechanismChoice, OperationChoice
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.machine_shaft.results import result_infos
+from sprag_study.engine.machine_shaft.simulate import simulate
+from sprag_study.engine.machine_shaft.spec import MachineSpec, MechanismChoice, OperationChoice
 
 NAMES = tuple(info.name for info in result_infos())
 RPM = math.pi / 30.0

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sprag.engine.endings import Ending
-from sprag.engine.machine_shaft.checked import check
-from sprag.engine.machine_shaft.columns import Columns
-from sprag.engine.machine_shaft.machine import Machine
-from sprag.engine.machine_shaft.motor import motor_torque, steady_speed
-from sprag.engine.machine_shaft.problems import UnbalancedWorkError
-from sprag.engine.machine_shaft.spec import Drive, MachineSpec, Motor, OperationChoice
-from sprag.engine.machine_shaft.trajectory import trajectory
+from sprag_study.engine.endings import Ending
+from sprag_study.engine.machine_shaft.checked import check
+from sprag_study.engine.machine_shaft.columns import Columns
+from sprag_study.engine.machine_shaft.machine import Machine
+from sprag_study.engine.machine_shaft.motor import motor_torque, steady_speed
+from sprag_study.engine.machine_shaft.problems import UnbalancedWorkError
+from sprag_study.engine.machine_shaft.spec import Drive, MachineSpec, Motor, OperationChoice
+from sprag_study.engine.machine_shaft.trajectory import trajectory
 from tests.engine.machine_shaft.machines import PRESS, PRESS_NUMBERS, ending_of, one
 
 PLAIN = MachineSpec(balance="refuse", operation=OperationChoice("torque", "constant"))

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice, PartChoice
-from sprag.engine.machine_shaft.trajectory import trajectory
+from sprag_study.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice, PartChoice
+from sprag_study.engine.machine_shaft.trajectory import trajectory
 
 CRANK, ROD, OFFSET, AREA, BACK = 0.06, 0.2, 0.013, 6e-3, 1e5
 SLIDER = {"crank": CRANK, "rod": ROD, "offset": OFFSET, "rod_centre": 0.07, "rod_mass": 2.5, "ram_mass": 3.0}

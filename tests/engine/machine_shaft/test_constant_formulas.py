@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sprag.service.spec.document import parse_spec
-from sprag.worker.models import run_chunk
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.worker.models import run_chunk
 
 _OPERATION = {"quantity": "torque", "formula": "-100 * (1 + sin(phi))"}
 

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from sprag.engine.machine_shaft.checked import check
-from sprag.engine.machine_shaft.problems import RelationError
-from sprag.engine.machine_shaft.spec import Drive, MachineSpec, OperationChoice, Stage
-from sprag.engine.machine_shaft.trajectory import trajectory
+from sprag_study.engine.machine_shaft.checked import check
+from sprag_study.engine.machine_shaft.problems import RelationError
+from sprag_study.engine.machine_shaft.spec import Drive, MachineSpec, OperationChoice, Stage
+from sprag_study.engine.machine_shaft.trajectory import trajectory
 from tests.engine.machine_shaft.machines import PRESS, PRESS_NUMBERS, one
 
 PLAIN = MachineSpec(operation=OperationChoice("torque", "constant"))

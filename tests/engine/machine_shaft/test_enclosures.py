@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.polynomial import chebyshev
 
-from sprag.engine.formulas.expressions import Expression
-from sprag.engine.machine_shaft.enclosures import Program
-from sprag.engine.machine_shaft.intervals import ORDERS
+from sprag_study.engine.formulas.expressions import Expression
+from sprag_study.engine.machine_shaft.enclosures import Program
+from sprag_study.engine.machine_shaft.intervals import ORDERS
 
 _PLACES = np.cos(np.linspace(0.0, np.pi, 60))
 

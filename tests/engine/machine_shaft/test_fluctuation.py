@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
-from sprag.engine.machine_shaft.trajectory import trajectory
+from sprag_study.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
+from sprag_study.engine.machine_shaft.trajectory import trajectory
 from tests.engine.machine_shaft.machines import PRESS, PRESS_NUMBERS, one
 
 #: Punching: the tool takes 12 kJ within 40 degrees of a revolution, while the motor gives a constant torque.

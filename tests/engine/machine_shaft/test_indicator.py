@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.engine.machine_shaft.machine import check_structure
-from sprag.engine.machine_shaft.problems import TableError
-from sprag.engine.machine_shaft.spec import MachineSpec, MechanismChoice, OperationChoice
-from sprag.engine.machine_shaft.tables import Table
-from sprag.engine.machine_shaft.trajectory import trajectory
+from sprag_study.engine.machine_shaft.machine import check_structure
+from sprag_study.engine.machine_shaft.problems import TableError
+from sprag_study.engine.machine_shaft.spec import MachineSpec, MechanismChoice, OperationChoice
+from sprag_study.engine.machine_shaft.tables import Table
+from sprag_study.engine.machine_shaft.trajectory import trajectory
 from tests.engine.machine_shaft.machines import one
 
 #: Four strokes: expansion after the ignition at the dead centre, exhaust, suction, compression.

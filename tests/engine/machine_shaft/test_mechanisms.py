@@ -11,12 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from sprag.engine.machine_shaft.cams import Cam
-from sprag.engine.machine_shaft.four_bars import FourBar, ParallelCrank
-from sprag.engine.machine_shaft.linkages import CrankShaper, ScotchYoke, SliderCrank, Whitworth
-from sprag.engine.machine_shaft.linked_rams import DragLink, Toggle
-from sprag.engine.machine_shaft.mechanisms import Mechanism
-from sprag.engine.machine_shaft.strokes import Stroke
+from sprag_study.engine.machine_shaft.cams import Cam
+from sprag_study.engine.machine_shaft.four_bars import FourBar, ParallelCrank
+from sprag_study.engine.machine_shaft.linkages import CrankShaper, ScotchYoke, SliderCrank, Whitworth
+from sprag_study.engine.machine_shaft.linked_rams import DragLink, Toggle
+from sprag_study.engine.machine_shaft.mechanisms import Mechanism
+from sprag_study.engine.machine_shaft.strokes import Stroke
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -11,11 +11,11 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
-from sprag.engine.machine_shaft.columns import Columns
-from sprag.engine.machine_shaft.motor_tables import motor_table
-from sprag.engine.machine_shaft.simulate import attempts, simulate
-from sprag.engine.machine_shaft.spec import Drive, MachineSpec, OperationChoice
-from sprag.engine.machine_shaft.tables import Table
+from sprag_study.engine.machine_shaft.columns import Columns
+from sprag_study.engine.machine_shaft.motor_tables import motor_table
+from sprag_study.engine.machine_shaft.simulate import attempts, simulate
+from sprag_study.engine.machine_shaft.spec import Drive, MachineSpec, OperationChoice
+from sprag_study.engine.machine_shaft.tables import Table
 from tests.engine.machine_shaft.machines import one
 
 if TYPE_CHECKING:

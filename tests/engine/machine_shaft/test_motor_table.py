@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.engine.endings import Ending
-from sprag.engine.machine_shaft.machine import check_structure
-from sprag.engine.machine_shaft.problems import StructureError, TableError
-from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
-from sprag.engine.machine_shaft.tables import Table
+from sprag_study.engine.endings import Ending
+from sprag_study.engine.machine_shaft.machine import check_structure
+from sprag_study.engine.machine_shaft.problems import StructureError, TableError
+from sprag_study.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
+from sprag_study.engine.machine_shaft.tables import Table
 from tests.engine.machine_shaft.machines import ending_of, one
 
 NUMBERS: dict[str, Any] = {

@@ -11,9 +11,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import erf
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.machine_shaft.simulate import simulate
-from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.machine_shaft.simulate import simulate
+from sprag_study.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
 from tests.engine.machine_shaft.machines import NAMES, one, results_of
 
 Floats = NDArray[np.float64]

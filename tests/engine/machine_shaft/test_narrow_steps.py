@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.machine_shaft.simulate import simulate
-from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice, PartChoice
-from sprag.engine.machine_shaft.tables import Table
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.machine_shaft.simulate import simulate
+from sprag_study.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice, PartChoice
+from sprag_study.engine.machine_shaft.tables import Table
 from tests.engine.machine_shaft.machines import NAMES, one
 
 STEP = MachineSpec(operation=OperationChoice("torque", "steps", steps=1))

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.engine.machine_shaft.machine import check_structure
-from sprag.engine.machine_shaft.spec import Drive, During, MachineSpec, MechanismChoice, OperationChoice
-from sprag.engine.machine_shaft.tables import Table
-from sprag.engine.machine_shaft.trajectory import trajectory
-from sprag.engine.problems import MachineError
+from sprag_study.engine.machine_shaft.machine import check_structure
+from sprag_study.engine.machine_shaft.spec import Drive, During, MachineSpec, MechanismChoice, OperationChoice
+from sprag_study.engine.machine_shaft.tables import Table
+from sprag_study.engine.machine_shaft.trajectory import trajectory
+from sprag_study.engine.problems import MachineError
 from tests.engine.machine_shaft.machines import PRESS, PRESS_NUMBERS, one, results_of
 
 CRANK, ROD = 0.1, 0.4

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.engine.endings import Ending
-from sprag.engine.machine_shaft.checked import check
-from sprag.engine.machine_shaft.problems import AssemblyError, StructureError
-from sprag.engine.machine_shaft.simulate import simulate
-from sprag.engine.machine_shaft.spec import MachineSpec, MechanismChoice, OperationChoice, PartChoice
-from sprag.engine.machine_shaft.tables import Table
-from sprag.engine.machine_shaft.trajectory import trajectory
+from sprag_study.engine.endings import Ending
+from sprag_study.engine.machine_shaft.checked import check
+from sprag_study.engine.machine_shaft.problems import AssemblyError, StructureError
+from sprag_study.engine.machine_shaft.simulate import simulate
+from sprag_study.engine.machine_shaft.spec import MachineSpec, MechanismChoice, OperationChoice, PartChoice
+from sprag_study.engine.machine_shaft.tables import Table
+from sprag_study.engine.machine_shaft.trajectory import trajectory
 from tests.engine.machine_shaft import independent, random_machines
 from tests.engine.machine_shaft.machines import PRESS, PRESS_NUMBERS, ending_of, one
 
@@ -154,8 +154,8 @@ def test_energy_closes_over_the_cycle_and_over_each_part() -> None:
 
 def _kinks(spec: MachineSpec, numbers: dict[str, Any]) -> np.ndarray:
     """Cuts of the machine's quadrature, between which its torques are smooth."""
-    from sprag.engine.machine_shaft.columns import Columns
-    from sprag.engine.machine_shaft.machine import Machine
+    from sprag_study.engine.machine_shaft.columns import Columns
+    from sprag_study.engine.machine_shaft.machine import Machine
 
     return np.concatenate([cut.ravel() for cut in Machine(spec, Columns.of(spec, numbers, 1)).breaks()])
 

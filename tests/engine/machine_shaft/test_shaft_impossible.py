@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.formulas.expressions import ExpressionError
-from sprag.engine.machine_shaft.checked import check
-from sprag.engine.machine_shaft.problems import AssemblyError, RelationError, TableError
-from sprag.engine.machine_shaft.simulate import simulate
-from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
-from sprag.engine.machine_shaft.tables import Table
-from sprag.engine.machine_shaft.trajectory import trajectory
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.formulas.expressions import ExpressionError
+from sprag_study.engine.machine_shaft.checked import check
+from sprag_study.engine.machine_shaft.problems import AssemblyError, RelationError, TableError
+from sprag_study.engine.machine_shaft.simulate import simulate
+from sprag_study.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
+from sprag_study.engine.machine_shaft.tables import Table
+from sprag_study.engine.machine_shaft.trajectory import trajectory
 from tests.engine.machine_shaft.machines import NAMES, PRESS, PRESS_NUMBERS, ending_of, one, results_of
 
 FLAT: dict[str, Any] = {"mean_speed": 10.0, "drive.inertia": 2.0}

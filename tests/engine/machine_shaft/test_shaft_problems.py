@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.formulas.expressions import ExpressionError
-from sprag.engine.machine_shaft.checked import check
-from sprag.engine.machine_shaft.estimate import estimate_seconds
-from sprag.engine.machine_shaft.parameters import parameters
-from sprag.engine.machine_shaft.problems import (
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.formulas.expressions import ExpressionError
+from sprag_study.engine.machine_shaft.checked import check
+from sprag_study.engine.machine_shaft.estimate import estimate_seconds
+from sprag_study.engine.machine_shaft.parameters import parameters
+from sprag_study.engine.machine_shaft.problems import (
     AssemblyError,
     InsufficientInertiaError,
     MotorStalledError,
@@ -25,12 +25,12 @@ from sprag.engine.machine_shaft.problems import (
     TableError,
     UnbalancedWorkError,
 )
-from sprag.engine.machine_shaft.results import result_infos
-from sprag.engine.machine_shaft.simulate import simulate
-from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
-from sprag.engine.machine_shaft.tables import Table
-from sprag.engine.machine_shaft.trajectory import trajectory
-from sprag.engine.problems import MachineError
+from sprag_study.engine.machine_shaft.results import result_infos
+from sprag_study.engine.machine_shaft.simulate import simulate
+from sprag_study.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
+from sprag_study.engine.machine_shaft.tables import Table
+from sprag_study.engine.machine_shaft.trajectory import trajectory
+from sprag_study.engine.problems import MachineError
 from tests.engine.machine_shaft.machines import NAMES, PRESS, PRESS_NUMBERS, RPM
 
 FLAT: dict[str, Any] = {"mean_speed": 10.0, "drive.inertia": 2.0}

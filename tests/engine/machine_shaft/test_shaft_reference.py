@@ -14,9 +14,9 @@ from typing import Any
 
 import pytest
 
-from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MeanSpeed, OperationChoice
-from sprag.engine.machine_shaft.tables import Table
-from sprag.engine.machine_shaft.trajectory import trajectory
+from sprag_study.engine.machine_shaft.spec import Drive, MachineSpec, MeanSpeed, OperationChoice
+from sprag_study.engine.machine_shaft.tables import Table
+from sprag_study.engine.machine_shaft.trajectory import trajectory
 from tests.engine.machine_shaft.machines import PRESS, PRESS_NUMBERS, RPM, one
 
 DATA = Path(__file__).resolve().parents[2] / "data" / "reference" / "machine_shaft.json"

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sprag.engine.machine_shaft.problems import TableError
-from sprag.engine.machine_shaft.tables import Table, over_stroke, periodic
+from sprag_study.engine.machine_shaft.problems import TableError
+from sprag_study.engine.machine_shaft.tables import Table, over_stroke, periodic
 
 TURN = 2.0 * math.pi
 

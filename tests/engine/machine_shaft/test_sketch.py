@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.engine.machine_shaft.columns import Columns
-from sprag.engine.machine_shaft.machine import Machine
-from sprag.engine.machine_shaft.sketch import Sketch
-from sprag.engine.machine_shaft.sketches import sketches
-from sprag.engine.machine_shaft.spec import MachineSpec, MechanismChoice, PartChoice
+from sprag_study.engine.machine_shaft.columns import Columns
+from sprag_study.engine.machine_shaft.machine import Machine
+from sprag_study.engine.machine_shaft.sketch import Sketch
+from sprag_study.engine.machine_shaft.sketches import sketches
+from sprag_study.engine.machine_shaft.spec import MachineSpec, MechanismChoice, PartChoice
 from tests.engine.machine_shaft.random_machines import RANDOM
 
 ANGLES = np.linspace(0.0, 2.0 * math.pi, 73)

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sprag.engine.endings import Ending
-from sprag.engine.formulas.expressions import ExpressionError
-from sprag.engine.machine_shaft.checked import check
-from sprag.engine.machine_shaft.problems import InsufficientInertiaError, MotorStalledError, QuadratureError
-from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice, PartChoice
-from sprag.engine.machine_shaft.trajectory import trajectory
+from sprag_study.engine.endings import Ending
+from sprag_study.engine.formulas.expressions import ExpressionError
+from sprag_study.engine.machine_shaft.checked import check
+from sprag_study.engine.machine_shaft.problems import InsufficientInertiaError, MotorStalledError, QuadratureError
+from sprag_study.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice, PartChoice
+from sprag_study.engine.machine_shaft.trajectory import trajectory
 from tests.engine.machine_shaft.machines import ending_of, one
 
 CRANK, MASS, INERTIA = 0.15, 40.0, 2.0

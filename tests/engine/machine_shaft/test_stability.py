@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.machine_shaft.checked import check
-from sprag.engine.machine_shaft.simulate import simulate
-from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
-from sprag.engine.machine_shaft.tables import Table
-from sprag.engine.machine_shaft.trajectory import trajectory
-from sprag.engine.machine_shaft.transient_course import Course
-from sprag.engine.machine_shaft.transients import transient
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.machine_shaft.checked import check
+from sprag_study.engine.machine_shaft.simulate import simulate
+from sprag_study.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
+from sprag_study.engine.machine_shaft.tables import Table
+from sprag_study.engine.machine_shaft.trajectory import trajectory
+from sprag_study.engine.machine_shaft.transient_course import Course
+from sprag_study.engine.machine_shaft.transients import transient
 from tests.engine.machine_shaft.machines import NAMES, PRESS, PRESS_NUMBERS, one
 
 TURN = 2.0 * math.pi

@@ -14,8 +14,8 @@ from typing import Any
 
 import pytest
 
-from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice, PartChoice
-from sprag.engine.machine_shaft.tables import Table
+from sprag_study.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice, PartChoice
+from sprag_study.engine.machine_shaft.tables import Table
 from tests.engine.machine_shaft.machines import RPM, one
 
 

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sprag.engine.endings import Ending
-from sprag.engine.machine_shaft.columns import Columns
-from sprag.engine.machine_shaft.machine import Machine
-from sprag.engine.machine_shaft.motor import motor_torque
-from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
-from sprag.engine.machine_shaft.tables import Table
-from sprag.engine.machine_shaft.transient_course import COLUMNS, RESULTS, Course, Transient
-from sprag.engine.machine_shaft.transients import transient
+from sprag_study.engine.endings import Ending
+from sprag_study.engine.machine_shaft.columns import Columns
+from sprag_study.engine.machine_shaft.machine import Machine
+from sprag_study.engine.machine_shaft.motor import motor_torque
+from sprag_study.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
+from sprag_study.engine.machine_shaft.tables import Table
+from sprag_study.engine.machine_shaft.transient_course import COLUMNS, RESULTS, Course, Transient
+from sprag_study.engine.machine_shaft.transients import transient
 from tests.engine.machine_shaft.machines import PRESS, PRESS_NUMBERS
 
 TURN = 2.0 * math.pi

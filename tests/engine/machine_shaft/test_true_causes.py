@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.machine_shaft.checked import check
-from sprag.engine.machine_shaft.problems import (
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.machine_shaft.checked import check
+from sprag_study.engine.machine_shaft.problems import (
     MotorOverrunError,
     MotorStalledError,
     NearSingularError,
     UnbalancedWorkError,
 )
-from sprag.engine.machine_shaft.simulate import simulate
-from sprag.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
+from sprag_study.engine.machine_shaft.simulate import simulate
+from sprag_study.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
 from tests.engine.machine_shaft.machines import NAMES, PRESS, PRESS_NUMBERS, ending_of, one
 
 MOTOR = {

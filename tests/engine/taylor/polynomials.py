@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.compile.jit import compiled
-from sprag.engine.taylor import batch, roots
+from sprag_study.engine.compile.jit import compiled
+from sprag_study.engine.taylor import batch, roots
 
 Floats = NDArray[np.float64]
 

@@ -9,9 +9,9 @@ import numba
 import numpy as np
 import pytest
 
-from sprag.engine.compile.lowering import lane_loops
-from sprag.engine.compile.ways import GROUP
-from sprag.engine.taylor.batch import (
+from sprag_study.engine.compile.lowering import lane_loops
+from sprag_study.engine.compile.ways import GROUP
+from sprag_study.engine.taylor.batch import (
     FOUND,
     HARD,
     KNOWN,
@@ -23,7 +23,7 @@ from sprag.engine.taylor.batch import (
     peaks_loop,
     roots_loop,
 )
-from sprag.engine.taylor.roots import MAX_DEGREE, NO_ROOT, work_stack
+from sprag_study.engine.taylor.roots import MAX_DEGREE, NO_ROOT, work_stack
 from tests.engine.taylor.polynomials import first_root, largest, put, slot_start, take
 
 ORDER = 10

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from sprag.engine.taylor.roots import NO_ROOT, work_stack
+from sprag_study.engine.taylor.roots import NO_ROOT, work_stack
 from tests.engine.taylor.polynomials import first_root, largest
 
 Floats = NDArray[np.float64]

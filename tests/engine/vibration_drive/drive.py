@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.outcome import Trajectory
-from sprag.engine.run import Run, Span
-from sprag.engine.vibration_drive.results import result_infos
-from sprag.engine.vibration_drive.simulate import simulate
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.outcome import Trajectory
+from sprag_study.engine.run import Run, Span
+from sprag_study.engine.vibration_drive.results import result_infos
+from sprag_study.engine.vibration_drive.simulate import simulate
 
 Columns = dict[str, Any]
 

@@ -13,9 +13,9 @@ import pytest
 from hypothesis import HealthCheck, Phase, assume, given, settings
 from hypothesis import strategies as st
 
-from sprag.engine.endings import Ending
-from sprag.engine.run import Reset
-from sprag.engine.vibration_drive.simulate import trajectory
+from sprag_study.engine.endings import Ending
+from sprag_study.engine.run import Reset
+from sprag_study.engine.vibration_drive.simulate import trajectory
 from tests.engine.vibration_drive.drive import Columns, Results, batch_of, clutch, column, drive, pendulum, periods
 from tests.engine.vibration_drive.reference_run import Accumulating, Drive
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sprag.engine.vibration_drive.automaton import (
+from sprag_study.engine.vibration_drive.automaton import (
     CLUTCH_TARGET,
     CLUTCH_THRESHOLD,
     TRANSITIONS,
@@ -19,7 +19,7 @@ from sprag.engine.vibration_drive.automaton import (
     Threshold,
     Transition,
 )
-from sprag.engine.vibration_drive.simulate import trajectory
+from sprag_study.engine.vibration_drive.simulate import trajectory
 from tests.engine.vibration_drive.drive import Columns, clutch, column, drive, one, pendulum, periods
 
 UP, DOWN = +1, -1

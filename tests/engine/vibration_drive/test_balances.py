@@ -7,10 +7,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from sprag.engine.endings import Ending
-from sprag.engine.run import Reset
-from sprag.engine.vibration_drive import characteristics as formulas
-from sprag.engine.vibration_drive.simulate import trajectory
+from sprag_study.engine.endings import Ending
+from sprag_study.engine.run import Reset
+from sprag_study.engine.vibration_drive import characteristics as formulas
+from sprag_study.engine.vibration_drive.simulate import trajectory
 from tests.engine.vibration_drive.drive import (
     Columns,
     Results,

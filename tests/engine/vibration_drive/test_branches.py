@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sprag.engine.continuation.follow import Range
-from sprag.engine.continuation.problem import Contact, End, Kind
-from sprag.engine.run import Run, SettledRun
-from sprag.engine.vibration_drive.branches import DriveBranch, NoOrbitError, branch
-from sprag.engine.vibration_drive.cases import case_matrix, with_lengths
-from sprag.engine.vibration_drive.integration import integrate
-from sprag.engine.vibration_drive.kernel import kernel_of
-from sprag.engine.vibration_drive.regimes import settled_infos
-from sprag.engine.vibration_drive.results import orbit_infos
-from sprag.engine.vibration_drive.settle import settle
-from sprag.engine.vibration_drive.strobes import BEGIN, SHAFT_SPEED, SHAFT_WIDTH, SPEED
+from sprag_study.engine.continuation.follow import Range
+from sprag_study.engine.continuation.problem import Contact, End, Kind
+from sprag_study.engine.run import Run, SettledRun
+from sprag_study.engine.vibration_drive.branches import DriveBranch, NoOrbitError, branch
+from sprag_study.engine.vibration_drive.cases import case_matrix, with_lengths
+from sprag_study.engine.vibration_drive.integration import integrate
+from sprag_study.engine.vibration_drive.kernel import kernel_of
+from sprag_study.engine.vibration_drive.regimes import settled_infos
+from sprag_study.engine.vibration_drive.results import orbit_infos
+from sprag_study.engine.vibration_drive.settle import settle
+from sprag_study.engine.vibration_drive.strobes import BEGIN, SHAFT_SPEED, SHAFT_WIDTH, SPEED
 from tests.engine.vibration_drive.drive import drive
 
 Floats = NDArray[np.float64]

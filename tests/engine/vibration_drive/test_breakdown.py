@@ -9,8 +9,8 @@ import pytest
 
 from benchmarks import breakdown
 from benchmarks.workloads import W1, W2
-from sprag.engine.vibration_drive.kernel import kernel_of, lane_count, order_for, source
-from sprag.engine.vibration_drive.layout import make_layout
+from sprag_study.engine.vibration_drive.kernel import kernel_of, lane_count, order_for, source
+from sprag_study.engine.vibration_drive.layout import make_layout
 
 
 def test_the_engine_takes_its_kernels_from_the_breakdown(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sprag.engine.run import Run, Span
-from sprag.engine.vibration_drive.simulate import trajectory
+from sprag_study.engine.run import Run, Span
+from sprag_study.engine.vibration_drive.simulate import trajectory
 from tests.engine.vibration_drive.drive import Columns, clutch, column, drive, one, pendulum, periods
 
 G = 9.80665

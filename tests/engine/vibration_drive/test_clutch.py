@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sprag.engine.vibration_drive.clutch import (
+from sprag_study.engine.vibration_drive.clutch import (
     HIGHEST_DEGREE,
     ClutchError,
     ClutchFit,
@@ -19,7 +19,7 @@ from sprag.engine.vibration_drive.clutch import (
     fit_clutch,
     torque,
 )
-from sprag.engine.vibration_drive.singular_values import singular_values
+from sprag_study.engine.vibration_drive.singular_values import singular_values
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "clutch_measured.csv"
 

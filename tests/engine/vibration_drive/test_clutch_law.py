@@ -9,8 +9,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from sprag.engine.vibration_drive.clutch import ClutchLawError, check_law, stiffness, stored_energy, torque
-from sprag.engine.vibration_drive.clutch_law import find_dip
+from sprag_study.engine.vibration_drive.clutch import ClutchLawError, check_law, stiffness, stored_energy, torque
+from sprag_study.engine.vibration_drive.clutch_law import find_dip
 
 LAW = (0.5, 200.0, 0.0, 20000.0)
 

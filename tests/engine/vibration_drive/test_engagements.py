@@ -9,13 +9,13 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from benchmarks.workloads import W1
-from sprag.engine.endings import Ending
-from sprag.engine.outcome import Engagement, Engagements
-from sprag.engine.run import Reset, SettledRun
-from sprag.engine.vibration_drive.engagements import MAX_PERIODS, engagements, settled_engagements
-from sprag.engine.vibration_drive.regimes import settled_infos
-from sprag.engine.vibration_drive.settle import settle
-from sprag.engine.vibration_drive.simulate import trajectory
+from sprag_study.engine.endings import Ending
+from sprag_study.engine.outcome import Engagement, Engagements
+from sprag_study.engine.run import Reset, SettledRun
+from sprag_study.engine.vibration_drive.engagements import MAX_PERIODS, engagements, settled_engagements
+from sprag_study.engine.vibration_drive.regimes import settled_infos
+from sprag_study.engine.vibration_drive.settle import settle
+from sprag_study.engine.vibration_drive.simulate import trajectory
 from tests.engine.vibration_drive.drive import Columns, clutch, column, drive, one, pendulum, periods
 
 #: Every pendulum of these works, and their clutches overlap.

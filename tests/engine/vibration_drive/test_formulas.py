@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sprag.engine.taylor.straight import Term, horner, integral, slope
-from sprag.engine.vibration_drive.clutch_law import stored_energy, torque
-from sprag.engine.vibration_drive.formulas import base_series, drive, free_acceleration
+from sprag_study.engine.taylor.straight import Term, horner, integral, slope
+from sprag_study.engine.vibration_drive.clutch_law import stored_energy, torque
+from sprag_study.engine.vibration_drive.formulas import base_series, drive, free_acceleration
 
 NUMBERS = {name: 0.3 + 0.7 * position for position, name in enumerate("abcdefgh")}
 TERMS = [Term(name) for name in NUMBERS]

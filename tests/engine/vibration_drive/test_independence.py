@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sprag.engine.run import Run
-from sprag.engine.vibration_drive import kernel as kernels
+from sprag_study.engine.run import Run
+from sprag_study.engine.vibration_drive import kernel as kernels
 from tests.engine.vibration_drive.drive import Columns, Results, batch_of, drive, periods
 
 CASES = 64

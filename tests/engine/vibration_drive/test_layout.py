@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sprag.engine.run import Run
-from sprag.engine.vibration_drive import layout
-from sprag.engine.vibration_drive.cases import Column, PendulumColumn, case_matrix, pendulum_column, stop_column
+from sprag_study.engine.run import Run
+from sprag_study.engine.vibration_drive import layout
+from sprag_study.engine.vibration_drive.cases import Column, PendulumColumn, case_matrix, pendulum_column, stop_column
 
 COLUMNS = {
     "excitation.frequency": 25.0, "excitation.amplitude_x": 0.002, "excitation.amplitude_y": 0.001,

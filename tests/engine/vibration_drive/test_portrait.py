@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from benchmarks.workloads import W1
-from sprag.engine.endings import Ending
-from sprag.engine.run import Run, SettledRun, Span
-from sprag.engine.vibration_drive.portrait import MAX_STROBES, portrait, settled_portrait
-from sprag.engine.vibration_drive.regimes import settled_infos
-from sprag.engine.vibration_drive.settle import settle
-from sprag.engine.vibration_drive.simulate import trajectory
-from sprag.engine.vibration_drive.strobes import BEGIN
+from sprag_study.engine.endings import Ending
+from sprag_study.engine.run import Run, SettledRun, Span
+from sprag_study.engine.vibration_drive.portrait import MAX_STROBES, portrait, settled_portrait
+from sprag_study.engine.vibration_drive.regimes import settled_infos
+from sprag_study.engine.vibration_drive.settle import settle
+from sprag_study.engine.vibration_drive.simulate import trajectory
+from sprag_study.engine.vibration_drive.strobes import BEGIN
 
 
 def drive(**changes: float) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.engine.endings import Ending
+from sprag_study.engine.endings import Ending
 from tests.engine.vibration_drive.drive import Columns, Results, batch_of, clutch, pendulum, periods
 
 DATA = Path(__file__).resolve().parents[2] / "data" / "reference"

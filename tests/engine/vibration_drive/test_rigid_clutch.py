@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from sprag.engine.run import SettledRun
-from sprag.engine.vibration_drive.regimes import settled_infos
-from sprag.engine.vibration_drive.settle import settle
+from sprag_study.engine.run import SettledRun
+from sprag_study.engine.vibration_drive.regimes import settled_infos
+from sprag_study.engine.vibration_drive.settle import settle
 from tests.engine.vibration_drive.drive import Columns, Results, clutch, drive, pendulum, periods
 from tests.engine.vibration_drive.reference_run import Drive
 

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from benchmarks.workloads import W1
-from sprag.engine.run import Run, SettledRun, Span
-from sprag.engine.vibration_drive.automaton import Clutch, Shaft
-from sprag.engine.vibration_drive.cases import case_matrix
-from sprag.engine.vibration_drive.integration import integrate
-from sprag.engine.vibration_drive.kernel import kernel_of
-from sprag.engine.vibration_drive.settle import settle
-from sprag.engine.vibration_drive.start_states import as_parameters, end_state
-from sprag.engine.vibration_drive.strobes import TURN
+from sprag_study.engine.run import Run, SettledRun, Span
+from sprag_study.engine.vibration_drive.automaton import Clutch, Shaft
+from sprag_study.engine.vibration_drive.cases import case_matrix
+from sprag_study.engine.vibration_drive.integration import integrate
+from sprag_study.engine.vibration_drive.kernel import kernel_of
+from sprag_study.engine.vibration_drive.settle import settle
+from sprag_study.engine.vibration_drive.start_states import as_parameters, end_state
+from sprag_study.engine.vibration_drive.strobes import TURN
 
 COLUMNS: dict[str, Any] = {
     **W1.columns(np.array([0])),

@@ -9,14 +9,14 @@ import pytest
 from scipy.stats import binomtest
 
 from benchmarks.workloads import W1
-from sprag.engine.endings import ENDINGS, Ending
-from sprag.engine.run import SettledRun
-from sprag.engine.vibration_drive import starts as module
-from sprag.engine.vibration_drive.regimes import Regime
-from sprag.engine.vibration_drive.same_motions import Motions
-from sprag.engine.vibration_drive.start_results import started_infos
-from sprag.engine.vibration_drive.starts import StartedBatch, basin, settle_starts, started_columns, wilson
-from sprag.engine.vibration_drive.strobes import SHAFT_SPEED
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.run import SettledRun
+from sprag_study.engine.vibration_drive import starts as module
+from sprag_study.engine.vibration_drive.regimes import Regime
+from sprag_study.engine.vibration_drive.same_motions import Motions
+from sprag_study.engine.vibration_drive.start_results import started_infos
+from sprag_study.engine.vibration_drive.starts import StartedBatch, basin, settle_starts, started_columns, wilson
+from sprag_study.engine.vibration_drive.strobes import SHAFT_SPEED
 
 NAMES = [info.name for info in started_infos(1)]
 ANGLE = "pendulums.0.initial_angle"

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sprag.engine.endings import Ending
-from sprag.engine.run import SettledRun
-from sprag.engine.vibration_drive.portrait import settled_portrait
-from sprag.engine.vibration_drive.regimes import Regime, settled_infos
-from sprag.engine.vibration_drive.settle import settle
-from sprag.engine.vibration_drive.start_states import end_state
-from sprag.engine.vibration_drive.turn import SettledTurn, settled_turn
+from sprag_study.engine.endings import Ending
+from sprag_study.engine.run import SettledRun
+from sprag_study.engine.vibration_drive.portrait import settled_portrait
+from sprag_study.engine.vibration_drive.regimes import Regime, settled_infos
+from sprag_study.engine.vibration_drive.settle import settle
+from sprag_study.engine.vibration_drive.start_states import end_state
+from sprag_study.engine.vibration_drive.turn import SettledTurn, settled_turn
 from tests.engine.vibration_drive.drive import Columns, drive
 
 #: 25 Hz and 0.2 N*m: a motion of order 2, whose strobes are moved.

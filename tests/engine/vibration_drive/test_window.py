@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sprag.engine.outcome import Trajectory
-from sprag.engine.run import Run, Span
-from sprag.engine.vibration_drive.simulate import trajectory
+from sprag_study.engine.outcome import Trajectory
+from sprag_study.engine.run import Run, Span
+from sprag_study.engine.vibration_drive.simulate import trajectory
 from tests.engine.vibration_drive.drive import Columns, Results, batch_of, clutch, column, drive, one, periods
 
 EXTREMA = {

@@ -11,11 +11,11 @@ from typing import Any
 
 import pytest
 
-from sprag.service.cli.app import command_line, execute
-from sprag.service.jobs import local
-from sprag.service.storage.people.audit import AuditFilter
-from sprag.service.storage.people.scopes import TokenScope
-from sprag.service.storage.store import Store
+from sprag_study.service.cli.app import command_line, execute
+from sprag_study.service.jobs import local
+from sprag_study.service.storage.people.audit import AuditFilter
+from sprag_study.service.storage.people.scopes import TokenScope
+from sprag_study.service.storage.store import Store
 from tests.contract.filling import create, finish
 from tests.migrations.frozen import thaw
 from tests.service.calibrating import spec_of
@@ -69,7 +69,7 @@ def known(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Sto
     for name, spec in (("spec", SPEC), ("bench", spec_of())):
         (tmp_path / f"{name}.json").write_text(json.dumps(spec))
     with Store.open(f"sqlite:///{tmp_path / 'known.sqlite3'}") as store:
-        from sprag.service.actor import Role
+        from sprag_study.service.actor import Role
 
         for name in ("dora", "ada"):
             store.people.add_user(name, Role.DESIGNER)

@@ -13,12 +13,12 @@ from typing import Any
 import pytest
 import typer
 
-from sprag.service.actor import Role
-from sprag.service.cli import completion
-from sprag.service.cli.app import app
-from sprag.service.settings import Settings
-from sprag.service.storage.people.scopes import TokenScope
-from sprag.worker.models import ENDING_SENTENCES, REGIME_SENTENCES, flags_of, model_names
+from sprag_study.service.actor import Role
+from sprag_study.service.cli import completion
+from sprag_study.service.cli.app import app
+from sprag_study.service.settings import Settings
+from sprag_study.service.storage.people.scopes import TokenScope
+from sprag_study.worker.models import ENDING_SENTENCES, REGIME_SENTENCES, flags_of, model_names
 from tests.conftest import ROOT
 from tests.service.conftest import Service
 from tests.serving import served
@@ -39,7 +39,7 @@ printf '%s\n' "${COMPREPLY[@]}"
 def installed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """An environment whose PATH has the command `sprag`, with what it gives bash to read as `COMPLETION`."""
     script = tmp_path_factory.mktemp("bin") / "sprag"
-    script.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m sprag.service.cli "$@"\n')
+    script.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m sprag_study.service.cli "$@"\n')
     script.chmod(0o755)
     path = f"{script.parent}{os.pathsep}{os.environ['PATH']}"
     environment = {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT)}

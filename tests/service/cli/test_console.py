@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from sprag.service.cli.console import (
+from sprag_study.service.cli.console import (
     ExitCode,
     TroubleError,
     WrongInputError,
@@ -22,9 +22,9 @@ from sprag.service.cli.console import (
     show_table,
     write_json,
 )
-from sprag.service.cli.extend import _what_is_new
-from sprag.service.cli.shown import show_curves, show_map
-from sprag.service.faults import Fault
+from sprag_study.service.cli.extend import _what_is_new
+from sprag_study.service.cli.shown import show_curves, show_map
+from sprag_study.service.faults import Fault
 
 
 @pytest.mark.parametrize(
@@ -150,7 +150,7 @@ def test_what_an_extension_adds_is_told() -> None:
 def test_a_bar_on_a_terminal_and_nothing_elsewhere() -> None:
     """Standard error is a terminal here; standard output is a pipe, which stays free of colours and bars."""
     code = (
-        "from sprag.service.cli.console import progress_bar, say, show_table\n"
+        "from sprag_study.service.cli.console import progress_bar, say, show_table\n"
         "with progress_bar('study [x]') as update:\n"
         "    update(1, 4, 'running')\n"
         "    update(4, 4, '')\n"
@@ -176,7 +176,7 @@ def test_a_bar_on_a_terminal_and_nothing_elsewhere() -> None:
 
 
 def test_an_id_is_never_cut(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sprag.service.cli.console._PLAIN_WIDTH", 80)
+    monkeypatch.setattr("sprag_study.service.cli.console._PLAIN_WIDTH", 80)
     columns = (("id", False, True), ("state", False, True), ("done", True), ("created", False), ("name", False))
     rows = [("st_38b213f6175b1470", "finished", 10**6, "2026-11-22T02:22:59.079014Z", "Feeder motor: speed " * 4)]
     show_table("", columns, rows)

@@ -10,13 +10,13 @@ from typing import Any
 
 import pytest
 
-from sprag.service.cli.app import execute
-from sprag.service.storage.database.session import Session
-from sprag.service.storage.database.sqlite_files import sqlite_driver
-from sprag.service.storage.errors import DatabaseError, SchemaError
-from sprag.service.storage.maintenance import revision
-from sprag.service.storage.store import Store
-from sprag.service.storage.tables import HEAD_REVISION, results_table
+from sprag_study.service.cli.app import execute
+from sprag_study.service.storage.database.session import Session
+from sprag_study.service.storage.database.sqlite_files import sqlite_driver
+from sprag_study.service.storage.errors import DatabaseError, SchemaError
+from sprag_study.service.storage.maintenance import revision
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.tables import HEAD_REVISION, results_table
 from tests.contract.filling import create, finish
 from tests.faults import refused
 from tests.migrations.frozen import thaw

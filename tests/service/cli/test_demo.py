@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from sprag.service.cli import demo
+from sprag_study.service.cli import demo
 from tests.conftest import Finished
 
 

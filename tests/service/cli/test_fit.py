@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from sprag.service.cli.fit import law_text
+from sprag_study.service.cli.fit import law_text
 
 Sprag = Callable[..., Any]
 

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.engine.endings import Ending
-from sprag.worker import models
-from sprag.worker.models import Trajectory
-from sprag.worker.study import Study
+from sprag_study.engine.endings import Ending
+from sprag_study.worker import models
+from sprag_study.worker.models import Trajectory
+from sprag_study.worker.study import Study
 from tests.wrong_specs import WRONG, changed
 
 Sprag = Callable[..., Any]
@@ -231,7 +231,7 @@ def test_a_wrong_choice_is_told_without_the_names_of_libraries(sprag: Sprag, exa
 
 def test_the_version(sprag: Sprag) -> None:
     done = sprag("--version")
-    assert (done.code, done.out) == (0, f"sprag {version('sprag')}\n")
+    assert (done.code, done.out) == (0, f"sprag {version('sprag-study')}\n")
 
 
 def test_a_usage_error_names_the_help(sprag: Sprag) -> None:

@@ -15,17 +15,24 @@ import pytest
 import typer
 from anyio.from_thread import BlockingPortal
 
-from sprag.service import client as clients
-from sprag.service import languages
-from sprag.service.cli.app import command_line
-from sprag.service.cli.console import ExitCode, WrongInputError, confirmed, duration_text, fault_line, warning_lines
-from sprag.service.cli.following import show_study
-from sprag.service.cli.language import chosen, refusal
-from sprag.service.client import Client, RefusedError
-from sprag.service.fault_meanings import MEANINGS, WARNING_MEANINGS
-from sprag.service.faults import Fault
-from sprag.service.languages.catalogue import Catalogue, Entry
-from sprag.service.languages.recorded import LATE
+from sprag_study.service import client as clients
+from sprag_study.service import languages
+from sprag_study.service.cli.app import command_line
+from sprag_study.service.cli.console import (
+    ExitCode,
+    WrongInputError,
+    confirmed,
+    duration_text,
+    fault_line,
+    warning_lines,
+)
+from sprag_study.service.cli.following import show_study
+from sprag_study.service.cli.language import chosen, refusal
+from sprag_study.service.client import Client, RefusedError
+from sprag_study.service.fault_meanings import MEANINGS, WARNING_MEANINGS
+from sprag_study.service.faults import Fault
+from sprag_study.service.languages.catalogue import Catalogue, Entry
+from sprag_study.service.languages.recorded import LATE
 from tests.service.conftest import PortalTransport, Service
 from tests.service.spec_sample import SPEC
 

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.cells import cell_len
 
-from sprag.service import languages
-from sprag.service.cli.console import show_table
-from sprag.service.cli.layout import Shape, blocks, broken, width_of
+from sprag_study.service import languages
+from sprag_study.service.cli.console import show_table
+from sprag_study.service.cli.layout import Shape, blocks, broken, width_of
 
 WIDTHS = (50, 64, 80, 100, 132, 200)
 NAMES = ("excitation.frequency [Hz]", "shaft.load [N*m]", "shaft.speed.mean [rad/s]", "clutches.0.power.loss [W]")

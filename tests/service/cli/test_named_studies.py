@@ -16,14 +16,14 @@ import pytest
 from anyio.from_thread import BlockingPortal
 from rich.cells import cell_len
 
-from sprag.service import client as clients
-from sprag.service.cli.app import execute
-from sprag.service.cli.console import WrongInputError
-from sprag.service.cli.names import study_of
-from sprag.service.client import Client
-from sprag.service.client.synchronous import naming
-from sprag.service.settings import default_database_path
-from sprag.worker.models import cache_folder
+from sprag_study.service import client as clients
+from sprag_study.service.cli.app import execute
+from sprag_study.service.cli.console import WrongInputError
+from sprag_study.service.cli.names import study_of
+from sprag_study.service.client import Client
+from sprag_study.service.client.synchronous import naming
+from sprag_study.service.settings import default_database_path
+from sprag_study.worker.models import cache_folder
 from tests.service.conftest import PortalTransport, Service
 
 Sprag = Callable[..., Any]
@@ -286,7 +286,7 @@ def test_a_study_is_kept_where_the_answer_is_no(
 ) -> None:
     study = submit(service, spec, "Feeder")
     monkeypatch.setattr("sys.stdin.isatty", lambda: True)
-    monkeypatch.setattr("sprag.service.cli.studies.confirmed", lambda _question: False)
+    monkeypatch.setattr("sprag_study.service.cli.studies.confirmed", lambda _question: False)
     assert execute(["delete", study, "--server", "http://localhost"]) == 0
     assert "nothing is deleted" in capsys.readouterr().err
     assert service.http.get(f"{API}/studies/{study}").status_code == 200

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from sprag.service.cli.remote import refusal
-from sprag.service.client import RefusedError
+from sprag_study.service.cli.remote import refusal
+from sprag_study.service.client import RefusedError
 
 
 def test_parameters_are_called_as_the_options_are() -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from sprag.service.schedules.policies import DueTime
+from sprag_study.service.schedules.policies import DueTime
 from tests.service.schedule_command import Run, runner
 from tests.service.timed_spec import SPEC
 

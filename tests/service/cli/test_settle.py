@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from sprag.engine.vibration_drive.regimes import settled_infos
-from sprag.service.results.regimes import motion_sentence
+from sprag_study.engine.vibration_drive.regimes import settled_infos
+from sprag_study.service.results.regimes import motion_sentence
 from tests.conftest import Finished
 
 Sprag = Callable[..., Finished]

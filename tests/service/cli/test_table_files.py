@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from sprag.service.cli.console import WrongInputError
-from sprag.service.cli.files import read_spec
-from sprag.service.spec.machine import shaft_parts
+from sprag_study.service.cli.console import WrongInputError
+from sprag_study.service.cli.files import read_spec
+from sprag_study.service.spec.machine import shaft_parts
 
 Sprag = Callable[..., Any]
 
@@ -84,7 +84,7 @@ def test_a_file_takes_the_place_of_what_is_there(
 
 
 def test_what_stays_beside_a_table_are_fields_of_the_spec() -> None:
-    from sprag.service.cli.table_files import _KEPT
+    from sprag_study.service.cli.table_files import _KEPT
 
     beside = {"interpolation", shaft_parts.RECORDED_AT.path}
     assert _KEPT["operation"] == {*shaft_parts.OPERATION_CHOICES, *beside, "scale", "efficiency"}

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from sprag.service import languages
-from sprag.service.actor import Role
-from sprag.service.cli.app import execute
-from sprag.service.storage.people.people import digest_of
-from sprag.service.storage.people.scopes import TokenScope
-from sprag.service.storage.store import Store
+from sprag_study.service import languages
+from sprag_study.service.actor import Role
+from sprag_study.service.cli.app import execute
+from sprag_study.service.storage.people.people import digest_of
+from sprag_study.service.storage.people.scopes import TokenScope
+from sprag_study.service.storage.store import Store
 
 if TYPE_CHECKING:
-    from sprag.service.settings import Settings
+    from sprag_study.service.settings import Settings
 
 
 def test_tokens_are_created_listed_and_revoked(settings: Settings, capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,15 +10,15 @@ import pytest
 import typer
 from typer.main import get_command
 
-from sprag.service import languages
-from sprag.service.cli import case_views, study_views
-from sprag.service.cli.app import app
-from sprag.service.views.answers import AnswersView
-from sprag.service.views.case_questions import CASE_VIEWS
-from sprag.service.views.cases import CASE_VIEWS as VIEWS_OF_CASES
-from sprag.service.views.setting import settings_of
-from sprag.service.views.studies import STUDY_VIEWS
-from sprag.worker.models import run_chunk
+from sprag_study.service import languages
+from sprag_study.service.cli import case_views, study_views
+from sprag_study.service.cli.app import app
+from sprag_study.service.views.answers import AnswersView
+from sprag_study.service.views.case_questions import CASE_VIEWS
+from sprag_study.service.views.cases import CASE_VIEWS as VIEWS_OF_CASES
+from sprag_study.service.views.setting import settings_of
+from sprag_study.service.views.studies import STUDY_VIEWS
+from sprag_study.worker.models import run_chunk
 from tests.service import conftest
 from tests.service.timed_spec import SPEC
 
@@ -123,7 +123,7 @@ def test_wrong_settings_name_their_options(
     ):  # fmt: skip
         done = sprag(arguments[0], sources[0], *arguments[1:])
         assert (done.code, named in done.err) == (2, True), (arguments, done.err)
-    monkeypatch.setattr("sprag.service.views.case_view.see", run)
+    monkeypatch.setattr("sprag_study.service.views.case_view.see", run)
     done = sprag("strobes", sources[0], "-o", "a.svg", "--language", "xx")
     assert (done.code, "--language: unknown language" in done.err) == (2, True), done.err
 

@@ -10,7 +10,7 @@ import pytest
 #: Modules that only POSIX has, and packages that only the server needs.
 POSIX = ("fcntl", "grp", "posix", "pwd", "resource", "termios", "tty")
 SERVER = (
-    "sprag.engine",
+    "sprag_study.engine",
     "fastapi",
     "jinja2",
     "matplotlib",
@@ -29,7 +29,7 @@ genuine = builtins.__import__
 
 def refuse(name, globals=None, *rest):
     importer = (globals or {{}}).get("__name__", "")
-    if importer.startswith(("sprag.service", "sprag.worker")) and name.partition(".")[0] in {posix}:
+    if importer.startswith(("sprag_study.service", "sprag_study.worker")) and name.partition(".")[0] in {posix}:
         raise ImportError(f"{{importer}} imports {{name}}")
     return genuine(name, globals, *rest)
 
@@ -47,9 +47,12 @@ def imported(module: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.parametrize(
     "module",
     [
-        "sprag.service.client",
-        "sprag.service.cli.app",
-        *(f"sprag.service.client.{name}" for name in ("bars", "comparison", "frames", "motions", "retries", "sketch")),
+        "sprag_study.service.client",
+        "sprag_study.service.cli.app",
+        *(
+            f"sprag_study.service.client.{name}"
+            for name in ("bars", "comparison", "frames", "motions", "retries", "sketch")
+        ),
     ],
 )
 def test_the_client_is_imported_without_the_rest(module: str) -> None:
@@ -58,7 +61,8 @@ def test_the_client_is_imported_without_the_rest(module: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("module", "missing"), [("sprag.worker.executors.dask_tasks", "fcntl"), ("sprag.service.http.app", "fastapi")]
+    ("module", "missing"),
+    [("sprag_study.worker.executors.dask_tasks", "fcntl"), ("sprag_study.service.http.app", "fastapi")],
 )
 def test_the_modules_are_really_refused(module: str, missing: str) -> None:
     done = imported(module)

@@ -11,7 +11,7 @@ from typing import Any
 import httpx
 import pytest
 
-from sprag.service.client import Client, RefusedError, UnreachableError
+from sprag_study.service.client import Client, RefusedError, UnreachableError
 
 Sprag = Callable[..., Any]
 

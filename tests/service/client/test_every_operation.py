@@ -15,8 +15,8 @@ from typing import Any
 import httpx
 import pytest
 
-from sprag.service import client as clients
-from sprag.service.client import AsyncClient, AsyncStudy, Client, ServiceError, Study
+from sprag_study.service import client as clients
+from sprag_study.service.client import AsyncClient, AsyncStudy, Client, ServiceError, Study
 from tests.service.client import generate
 from tests.service.conftest import Service
 

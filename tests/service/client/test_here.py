@@ -18,11 +18,11 @@ import pandas as pd
 import pytest
 from anyio.from_thread import BlockingPortal
 
-import sprag
-from sprag.here import Here
-from sprag.service.client import Client, RefusedError, Study
-from sprag.service.settings import Settings
-from sprag.service.storage.studies.records import StudyRecord
+import sprag_study as sprag
+from sprag_study.here import Here
+from sprag_study.service.client import Client, RefusedError, Study
+from sprag_study.service.settings import Settings
+from sprag_study.service.storage.studies.records import StudyRecord
 from tests.service.calibrating import calibration
 from tests.service.conftest import PortalTransport, Service
 from tests.service.searching import search
@@ -262,7 +262,7 @@ left = sprag.run({_small()!r}, processes=0)
 
 
 def test_a_preset_is_named_and_a_file_of_that_name_comes_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from sprag.service.client.queries import spec_of
+    from sprag_study.service.client.queries import spec_of
 
     assert spec_of("one_pendulum") == sprag.preset("one_pendulum")
     monkeypatch.chdir(tmp_path)

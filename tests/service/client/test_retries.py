@@ -8,8 +8,8 @@ from typing import Any
 import httpx
 import pytest
 
-from sprag.service.client import Client, RefusedError, Study, UnreachableError
-from sprag.service.client.synchronous.following import events_of
+from sprag_study.service.client import Client, RefusedError, Study, UnreachableError
+from sprag_study.service.client.synchronous.following import events_of
 
 DOWN = "down"
 BROKEN = "broken"
@@ -45,7 +45,7 @@ def scripted() -> Scripted:
 def pauses(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """Nothing sleeps; the seconds are noted."""
     noted: list[float] = []
-    monkeypatch.setattr("sprag.service.client.synchronous.connection.time.sleep", noted.append)
+    monkeypatch.setattr("sprag_study.service.client.synchronous.connection.time.sleep", noted.append)
     return noted
 
 

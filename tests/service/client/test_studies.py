@@ -15,8 +15,8 @@ import pandas as pd
 import pytest
 from anyio.from_thread import BlockingPortal
 
-from sprag.service.answers.studies import StudyDetail
-from sprag.service.client import (
+from sprag_study.service.answers.studies import StudyDetail
+from sprag_study.service.client import (
     AmbiguousError,
     ArgumentError,
     AsyncClient,
@@ -32,7 +32,7 @@ from tests.faults import refused
 from tests.service.conftest import PortalTransport, Service
 
 if TYPE_CHECKING:
-    from sprag.worker.models import ChunkResult
+    from sprag_study.worker.models import ChunkResult
 
 SPEED = "shaft.speed.mean"
 ID = "st_0123456789abcdef"

@@ -13,10 +13,10 @@ import polars as pl
 import pytest
 from anyio.from_thread import BlockingPortal
 
-from sprag.service.answers.differing import differing
-from sprag.service.client import AsyncClient, AsyncStudy, Client, Study, UnreachableError, with_units
-from sprag.service.client.bars import bar_html, reporting
-from sprag.service.client.sketch import sketch
+from sprag_study.service.answers.differing import differing
+from sprag_study.service.client import AsyncClient, AsyncStudy, Client, Study, UnreachableError, with_units
+from sprag_study.service.client.bars import bar_html, reporting
+from sprag_study.service.client.sketch import sketch
 from tests.service.conftest import PortalTransport, Service
 
 SPEED, LOAD, HERTZ = "shaft.speed.mean", "shaft.load", "excitation.frequency"
@@ -152,7 +152,7 @@ def test_a_notebook_has_a_bar_without_being_asked(study: Study, monkeypatch: pyt
         return Handle()
 
     monkeypatch.setattr(display, "display", show)
-    monkeypatch.setattr("sprag.service.client.bars.in_notebook", lambda: True)
+    monkeypatch.setattr("sprag_study.service.client.bars.in_notebook", lambda: True)
     with reporting(None) as tell:
         tell(study.detail())
         tell(study.detail())
@@ -195,7 +195,7 @@ def test_events_go_on_over_a_restart(monkeypatch: pytest.MonkeyPatch) -> None:
     async def sleep(seconds: float) -> None:
         pauses.append(seconds)
 
-    monkeypatch.setattr("sprag.service.client.asynchronous.following.asyncio.sleep", sleep)
+    monkeypatch.setattr("sprag_study.service.client.asynchronous.following.asyncio.sleep", sleep)
 
     async def read() -> list[str]:
         async with AsyncClient("http://sprag", transport=httpx.MockTransport(scripted)) as client:

@@ -15,13 +15,13 @@ import pandas as pd
 import pint
 import pytest
 
-from sprag.local import LocalStudy
-from sprag.service.answers.goals import FrontReport
-from sprag.service.client import ArgumentError, AsyncStudy, Client, Curves, Motion, Study
-from sprag.service.client.queries import query_of
-from sprag.service.views import case_questions, study_questions
-from sprag.service.views.setting import Setting, ViewInfo
-from sprag.service.views.studies import STUDY_VIEWS
+from sprag_study.local import LocalStudy
+from sprag_study.service.answers.goals import FrontReport
+from sprag_study.service.client import ArgumentError, AsyncStudy, Client, Curves, Motion, Study
+from sprag_study.service.client.queries import query_of
+from sprag_study.service.views import case_questions, study_questions
+from sprag_study.service.views.setting import Setting, ViewInfo
+from sprag_study.service.views.studies import STUDY_VIEWS
 from tests.service.client import view_methods
 
 LOAD, SPEED = "shaft.load", "shaft.speed.mean"

@@ -10,8 +10,8 @@ from typing import Any
 import httpx
 import pytest
 
-from sprag.service.cli import remote
-from sprag.service.client import (
+from sprag_study.service.cli import remote
+from sprag_study.service.client import (
     AsyncClient,
     Client,
     RefusedError,
@@ -66,8 +66,8 @@ def sleeps(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     async def sleep(seconds: float) -> None:
         noted.append(seconds)
 
-    monkeypatch.setattr("sprag.service.client.synchronous.following.time.sleep", noted.append)
-    monkeypatch.setattr("sprag.service.client.asynchronous.following.asyncio.sleep", sleep)
+    monkeypatch.setattr("sprag_study.service.client.synchronous.following.time.sleep", noted.append)
+    monkeypatch.setattr("sprag_study.service.client.asynchronous.following.asyncio.sleep", sleep)
     return noted
 
 
@@ -101,7 +101,7 @@ def test_a_restart_is_waited_over_and_told(wait: Waits, sleeps: list[float], cap
     running, seen = study("running"), list[str]()
     looks = [running, running, running, DOWN, PROXY, BUSY, running, running, study("finished")]
     scripted = Scripted(looks, [[EVENT], [EVENT, EVENT]])
-    with caplog.at_level(logging.WARNING, "sprag.service.client.waiting"):
+    with caplog.at_level(logging.WARNING, "sprag.client"):
         wait(scripted, progress=lambda study: seen.append(study["state"]))
     assert not scripted.looks
     assert seen == ["running"] * 4 + ["finished"]

@@ -9,10 +9,10 @@ from pathlib import Path
 from types import UnionType
 from typing import Any, Final, Literal, get_args, get_origin
 
-from sprag.service.views import case_questions, study_questions
-from sprag.service.views.cases import CASE_VIEWS
-from sprag.service.views.setting import NamedSetting, ViewInfo, settings_of
-from sprag.service.views.studies import STUDY_VIEWS
+from sprag_study.service.views import case_questions, study_questions
+from sprag_study.service.views.cases import CASE_VIEWS
+from sprag_study.service.views.setting import NamedSetting, ViewInfo, settings_of
+from sprag_study.service.views.studies import STUDY_VIEWS
 
 CLIENT: Final = Path(__file__).resolve().parents[3] / "service" / "client"
 #: What stands for a number or a text with a unit in the help of commands.
@@ -30,13 +30,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, cast
 
-from sprag.service.client.asynchronous.part import AsyncStudyPart
+from sprag_study.service.client.asynchronous.part import AsyncStudyPart
 {tables}
-from sprag.service.client.queries import query_of
+from sprag_study.service.client.queries import query_of
 
 if TYPE_CHECKING:
 {shapes}
-    from sprag.service.client.queries import Ends, Held, Value
+    from sprag_study.service.client.queries import Ends, Held, Value
 
 
 class AsyncStudyViews(AsyncStudyPart):
@@ -65,7 +65,7 @@ def _tables() -> dict[str, str]:
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             for field in node.body if isinstance(node, ast.ClassDef) else ():
                 if isinstance(field, ast.AnnAssign) and ast.unparse(field.target) == "data":
-                    module = f"sprag.service.client.{path.stem}"
+                    module = f"sprag_study.service.client.{path.stem}"
                     found |= dict.fromkeys(ast.unparse(field.annotation).split(" | "), f"{module} {node.name}")
     return found
 

@@ -15,9 +15,9 @@ import h5py
 import numpy as np
 import pytest
 
-from sprag.service.client.frames import grid_of
-from sprag.service.exports.netcdf import cf_name
-from sprag.worker import models
+from sprag_study.service.client.frames import grid_of
+from sprag_study.service.exports.netcdf import cf_name
+from sprag_study.worker import models
 from tests.service.swept_study import swept_study
 
 if TYPE_CHECKING:

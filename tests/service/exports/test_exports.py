@@ -19,19 +19,19 @@ import pytest
 import xarray as xr
 from openpyxl.utils import get_column_letter
 
-from sprag.service import exports
-from sprag.service.client.frames import grid_of
-from sprag.service.exports import Source, xlsx
-from sprag.service.formats import FORMATS, MEDIA_TYPES, SUFFIXES, Format, format_of
-from sprag.service.storage.studies.records import RowBlock
-from sprag.worker import fingerprint, models
-from sprag.worker.study import Study
+from sprag_study.service import exports
+from sprag_study.service.client.frames import grid_of
+from sprag_study.service.exports import Source, xlsx
+from sprag_study.service.formats import FORMATS, MEDIA_TYPES, SUFFIXES, Format, format_of
+from sprag_study.service.storage.studies.records import RowBlock
+from sprag_study.worker import fingerprint, models
+from sprag_study.worker.study import Study
 from tests.service.conftest import made_up
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.worker.models import ChunkResult
+    from sprag_study.worker.models import ChunkResult
     from tests.service.conftest import Service
 
 API = "/api/v1"

@@ -14,10 +14,10 @@ import pyarrow.parquet as pq
 import pytest
 import xarray as xr
 
-from sprag.service.exports.source import given_texts
-from sprag.service.report.document import report_of
-from sprag.service.spec.document import load_spec
-from sprag.service.views.library import Library
+from sprag_study.service.exports.source import given_texts
+from sprag_study.service.report.document import report_of
+from sprag_study.service.spec.document import load_spec
+from sprag_study.service.views.library import Library
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service

@@ -10,10 +10,10 @@ from typing import Any
 import openpyxl
 import pytest
 
-from sprag.service.exports import xlsx
-from sprag.service.exports.source import Source
-from sprag.service.spec.document import parse_spec
-from sprag.worker import models
+from sprag_study.service.exports import xlsx
+from sprag_study.service.exports.source import Source
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.worker import models
 
 LIMIT = 32_767
 #: An indicator diagram with decimal commas, as an instrument writes it.

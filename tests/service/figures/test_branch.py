@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from sprag.service.figures.branch import branch_figure, stable_segments
-from sprag.service.views.branch import neighbours, usual_along
-from sprag.worker.models.branches import Along, BranchContact, CaseBranch, SpecialPoint
-from sprag.worker.study import Axis, Study
+from sprag_study.service.figures.branch import branch_figure, stable_segments
+from sprag_study.service.views.branch import neighbours, usual_along
+from sprag_study.worker.models.branches import Along, BranchContact, CaseBranch, SpecialPoint
+from sprag_study.worker.study import Axis, Study
 
 ALONG = Along(("shaft.load",), 0.0, 4.0)
 

@@ -9,12 +9,12 @@ from xml.etree import ElementTree
 
 import pytest
 
-from sprag.service.figures.drawing import svg, with_leaders
-from sprag.service.figures.drawings import drawings
-from sprag.service.http.views import preset_of
-from sprag.service.presets import preset_names
-from sprag.service.spec.document import parse_spec
-from sprag.worker.study import Study
+from sprag_study.service.figures.drawing import svg, with_leaders
+from sprag_study.service.figures.drawings import drawings
+from sprag_study.service.http.views import preset_of
+from sprag_study.service.presets import preset_names
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.worker.study import Study
 
 
 def _study(name: str) -> Study:

@@ -6,18 +6,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sprag.service import languages
-from sprag.service.figures.curves import curves_figure
-from sprag.service.figures.figure import PALETTE
-from sprag.service.figures.motion import motion_figure, phase_figure
-from sprag.service.figures.portrait import portrait_figure
-from sprag.service.figures.svg import svg
-from sprag.service.reading.reader import shown as shown_text
-from sprag.service.results.curve_cases import draw, select
-from sprag.service.results.curves import CurveQuery
-from sprag.service.spec.document import parse_spec
-from sprag.service.storage.studies.records import CaseColumns
-from sprag.worker import models
+from sprag_study.service import languages
+from sprag_study.service.figures.curves import curves_figure
+from sprag_study.service.figures.figure import PALETTE
+from sprag_study.service.figures.motion import motion_figure, phase_figure
+from sprag_study.service.figures.portrait import portrait_figure
+from sprag_study.service.figures.svg import svg
+from sprag_study.service.reading.reader import shown as shown_text
+from sprag_study.service.results.curve_cases import draw, select
+from sprag_study.service.results.curves import CurveQuery
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.storage.studies.records import CaseColumns
+from sprag_study.worker import models
 from tests.service.figures.seen import seen
 
 if TYPE_CHECKING:

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.service.figures.curves import curves_figure
-from sprag.service.figures.orders import looks_of, motion_name, motion_text, order_map
-from sprag.service.figures.pictures import draw_map as paint_map
-from sprag.service.figures.svg import picture_svg
-from sprag.service.figures.svg_map import picture_map
-from sprag.service.results.curve_cases import draw, draw_map, select
-from sprag.service.results.curves import CurveQuery, Curves, Map
-from sprag.worker import models
+from sprag_study.service.figures.curves import curves_figure
+from sprag_study.service.figures.orders import looks_of, motion_name, motion_text, order_map
+from sprag_study.service.figures.pictures import draw_map as paint_map
+from sprag_study.service.figures.svg import picture_svg
+from sprag_study.service.figures.svg_map import picture_map
+from sprag_study.service.results.curve_cases import draw, draw_map, select
+from sprag_study.service.results.curves import CurveQuery, Curves, Map
+from sprag_study.worker import models
 from tests.service.figures.seen import seen
 from tests.service.results.test_regimes import ORDERS, REGIMES, fetched, study
 

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sprag.service.figures.curves import curves_figure
-from sprag.service.figures.figure import Quantity
-from sprag.service.figures.pictures import draw_curves, draw_figure
-from sprag.service.figures.pictures import draw_map as paint_map
-from sprag.service.figures.read import read_map
-from sprag.service.reading.reader import Reading
-from sprag.service.results.curve_cases import draw, draw_map, select
-from sprag.service.results.curves import CurveQuery
-from sprag.service.spec.document import parse_spec
-from sprag.service.storage.studies.records import CaseColumns
-from sprag.worker import models
+from sprag_study.service.figures.curves import curves_figure
+from sprag_study.service.figures.figure import Quantity
+from sprag_study.service.figures.pictures import draw_curves, draw_figure
+from sprag_study.service.figures.pictures import draw_map as paint_map
+from sprag_study.service.figures.read import read_map
+from sprag_study.service.reading.reader import Reading
+from sprag_study.service.results.curve_cases import draw, draw_map, select
+from sprag_study.service.results.curves import CurveQuery
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.storage.studies.records import CaseColumns
+from sprag_study.worker import models
 from tests.service.figures.seen import Seen, seen
 
 if TYPE_CHECKING:

@@ -10,10 +10,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from sprag.service.figures.figure import PALETTE, Figure, Fill, Line, Panel, Quantity, line_colours
-from sprag.service.figures.painter.elements import SMALL, lines_of, text_width
-from sprag.service.figures.painter.scales import Scale, rounded_scale, tick_text
-from sprag.service.figures.svg import picture_svg, spark, svg
+from sprag_study.service.figures.figure import PALETTE, Figure, Fill, Line, Panel, Quantity, line_colours
+from sprag_study.service.figures.painter.elements import SMALL, lines_of, text_width
+from sprag_study.service.figures.painter.scales import Scale, rounded_scale, tick_text
+from sprag_study.service.figures.svg import picture_svg, spark, svg
 
 X = np.linspace(0.0, 1.6, 9)
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.actor import Door, Role, act_as, of_machine
-from sprag.service.http.app import create_app
-from sprag.service.storage.people.scopes import TokenScope
+from sprag_study.service.actor import Door, Role, act_as, of_machine
+from sprag_study.service.http.app import create_app
+from sprag_study.service.storage.people.scopes import TokenScope
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import httpx
     from fastapi import FastAPI
 
-    from sprag.service.settings import Settings
+    from sprag_study.service.settings import Settings
     from tests.service.conftest import Service
 
 #: Users by role.

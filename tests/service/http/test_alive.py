@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from sprag.service.http.alive import address, is_alive
-from sprag.service.settings import Settings
+from sprag_study.service.http.alive import address, is_alive
+from sprag_study.service.settings import Settings
 from tests.acceptance.processes import service
 
 

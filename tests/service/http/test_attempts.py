@@ -14,16 +14,16 @@ import httpx
 import pytest
 from pydantic import SecretStr
 
-from sprag.service.http import attempts as module
-from sprag.service.http.app import create_app
-from sprag.service.http.attempts import FIRST_SECONDS, FORGET_SECONDS, LONGEST_SECONDS, MOST_WAITING, Attempts
-from sprag.service.http.problems import ApiError
-from sprag.service.logs import JsonFormatter, TextFormatter
+from sprag_study.service.http import attempts as module
+from sprag_study.service.http.app import create_app
+from sprag_study.service.http.attempts import FIRST_SECONDS, FORGET_SECONDS, LONGEST_SECONDS, MOST_WAITING, Attempts
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.logs import JsonFormatter, TextFormatter
 from tests.conftest import ROOT
 from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
-    from sprag.service.settings import Settings
+    from sprag_study.service.settings import Settings
     from tests.service.conftest import Service
 
 TOKEN = "correct-horse-battery-staple"

@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any
 import httpx
 import pytest
 
-from sprag.service.actor import Door, Role
-from sprag.service.http.api import examples
-from sprag.service.http.roles import ROLES
-from sprag.service.storage.people.audit import AuditFilter
+from sprag_study.service.actor import Door, Role
+from sprag_study.service.http.api import examples
+from sprag_study.service.http.roles import ROLES
+from sprag_study.service.storage.people.audit import AuditFilter
 from tests.service.calibrating import CALIBRATE
 from tests.service.http.people import OWN, Office
 from tests.service.swept_study import swept_study
 from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
-    from sprag.service.settings import Settings
+    from sprag_study.service.settings import Settings
     from tests.service.conftest import Service
 
 API = "/api/v1"

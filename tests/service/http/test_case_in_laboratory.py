@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from sprag.service.presets import preset_text
-from sprag.service.spec.text import load_spec
+from sprag_study.service.presets import preset_text
+from sprag_study.service.spec.text import load_spec
 from tests.service.conftest import Service
 from tests.service.rounds import computed
 

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.service.answers.differing import MOST_COMPARED, NO_PARAMETERS, common_axes, unique_names
-from sprag.service.presets import preset_text
-from sprag.service.reading.wording import number
-from sprag.service.spec.text import load_spec
-from sprag.worker import models
+from sprag_study.service.answers.differing import MOST_COMPARED, NO_PARAMETERS, common_axes, unique_names
+from sprag_study.service.presets import preset_text
+from sprag_study.service.reading.wording import number
+from sprag_study.service.spec.text import load_spec
+from sprag_study.worker import models
 from tests.service.conftest import Service
 from tests.service.figures.seen import seen
 from tests.service.timed_spec import SPEC

@@ -18,17 +18,17 @@ from typing import TYPE_CHECKING
 import psutil
 import pytest
 
-from sprag.service.http.computer import MAX_WAITING, Limits, ProcessComputer
-from sprag.service.http.problems import ApiError
-from sprag.worker import models
-from sprag.worker.limits import COMPUTATION_BYTES
-from sprag.worker.pool.child_process import ProcessStartError
+from sprag_study.service.http.computer import MAX_WAITING, Limits, ProcessComputer
+from sprag_study.service.http.problems import ApiError
+from sprag_study.worker import models
+from sprag_study.worker.limits import COMPUTATION_BYTES
+from sprag_study.worker.pool.child_process import ProcessStartError
 from tests.worker import fakes
 
 if TYPE_CHECKING:
     from anyio.from_thread import BlockingPortal
 
-    from sprag.service.faults import Kind
+    from sprag_study.service.faults import Kind
 
 
 @pytest.fixture

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import anyio
 import pytest
 
-from sprag.service.http.drain import Drain
-from sprag.service.json_text import to_bytes
-from sprag.service.storage.errors import EndingError
+from sprag_study.service.http.drain import Drain
+from sprag_study.service.json_text import to_bytes
+from sprag_study.service.storage.errors import EndingError
 from tests.service.conftest import API, Service
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ def test_no_write_begins_after_the_cut_and_the_one_under_way_is_kept(service: Se
 
 @pytest.mark.parametrize("address", ["/studies", "/studies:preview"])
 def test_a_check_that_is_cut_off_is_told_to_come_back(service: Service, spec: Any, address: str) -> None:
-    from sprag.service.http.computer import Limits, ProcessComputer
+    from sprag_study.service.http.computer import Limits, ProcessComputer
 
     computer = ProcessComputer(Limits(60.0, 2**30))
     service.checker.run = computer.run  # type: ignore[method-assign]

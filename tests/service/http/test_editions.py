@@ -11,8 +11,8 @@ from tests.service.timed_spec import SPEC
 if TYPE_CHECKING:
     import pytest
 
-    from sprag.service.schedules.fields import ScheduleFields
-    from sprag.service.storage.schedules.runs import ScheduleRecord
+    from sprag_study.service.schedules.fields import ScheduleFields
+    from sprag_study.service.storage.schedules.runs import ScheduleRecord
 
 
 def _ended(service: Service) -> str:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import httpx
 import pytest
 
-from sprag.service.http.timeouts import TimeoutProtocol
-from sprag.service.views import sensitivity as sensitivities
+from sprag_study.service.http.timeouts import TimeoutProtocol
+from sprag_study.service.views import sensitivity as sensitivities
 from tests.service.conftest import API, Service
 from tests.service.http.test_timeouts import serving
 

@@ -12,8 +12,8 @@ import httpx
 import pytest
 from anyio.from_thread import BlockingPortal
 
-from sprag.service.http.api import results as results_of_api
-from sprag.service.http.kept_files import KeptFiles
+from sprag_study.service.http.api import results as results_of_api
+from sprag_study.service.http.kept_files import KeptFiles
 from tests.service.conftest import API, Service
 
 
@@ -232,7 +232,7 @@ def test_an_address_tells_its_methods(service: Service) -> None:
 
 
 def test_a_refusal_for_now_says_when_to_come_back(service: Service) -> None:
-    from sprag.service.http.problems import ApiError, problem_response
+    from sprag_study.service.http.problems import ApiError, problem_response
 
     for kind in ("queue-full", "too-many-requests", "unavailable"):
         assert int(problem_response(ApiError(kind, "later")).headers["retry-after"]) > 0

@@ -14,10 +14,10 @@ from typing import Any
 import httpx
 import pytest
 
-from sprag.service.exports import netcdf
-from sprag.service.formats import FORMATS
-from sprag.service.http.api import results as results_of_api
-from sprag.service.storage.rows.rows import Rows
+from sprag_study.service.exports import netcdf
+from sprag_study.service.formats import FORMATS
+from sprag_study.service.http.api import results as results_of_api
+from sprag_study.service.storage.rows.rows import Rows
 from tests.service.conftest import API, Service
 from tests.serving import served
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from pydantic import SecretStr
 
-from sprag.service.http import attempts
-from sprag.service.http.api.schedules import EXAMPLE
-from sprag.service.http.app import create_app
-from sprag.service.http.problems import ApiError
+from sprag_study.service.http import attempts
+from sprag_study.service.http.api.schedules import EXAMPLE
+from sprag_study.service.http.app import create_app
+from sprag_study.service.http.problems import ApiError
 from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     import httpx
 
-    from sprag.service.settings import Settings
+    from sprag_study.service.settings import Settings
     from tests.service.conftest import Service
 
 #: A spec has thousands of bounds, and a report takes a second to print: left to ``python -m benchmarks.fuzz``.

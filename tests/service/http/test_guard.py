@@ -12,10 +12,10 @@ import httpx
 import pytest
 from pydantic import SecretStr
 
-from sprag.service.http.app import create_app
-from sprag.service.http.guard import OPEN_PATHS, Guard
-from sprag.service.settings import Settings, UnsafeSettingsError
-from sprag.worker.limits import MAX_BODY_BYTES
+from sprag_study.service.http.app import create_app
+from sprag_study.service.http.guard import OPEN_PATHS, Guard
+from sprag_study.service.settings import Settings, UnsafeSettingsError
+from sprag_study.worker.limits import MAX_BODY_BYTES
 from tests.service.http.routes import every_route
 from tests.service.timed_spec import SPEC
 

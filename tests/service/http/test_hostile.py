@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from sprag.service.cli.app import execute
+from sprag_study.service.cli.app import execute
 from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:

@@ -9,9 +9,9 @@ from pathlib import Path
 SCRIPT = """
 import asyncio, sys
 import httpx
-from sprag.service.http.app import create_app
-from sprag.service.settings import Settings
-from sprag.worker import models
+from sprag_study.service.http.app import create_app
+from sprag_study.service.settings import Settings
+from sprag_study.worker import models
 
 async def look():
     app = create_app(Settings(database=sys.argv[1]), computer=object(), checker=object())

@@ -51,7 +51,7 @@ def test_queue_endings_and_cases_are_counted(service: Service) -> None:
 
 
 def test_the_time_of_cases_falls_into_its_buckets(service: Service, monkeypatch: pytest.MonkeyPatch) -> None:
-    from sprag.service.storage.figures import FinishedWork
+    from sprag_study.service.storage.figures import FinishedWork
 
     now = service.store.clock.now()
     work = [FinishedWork(now, 1.0, 10), FinishedWork(now, 4.0, 2)]  # 0.1 s and 2 s each

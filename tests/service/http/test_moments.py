@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.http.threads import _in_one_moment, in_thread
-from sprag.service.storage.database.session import Moment, Session
+from sprag_study.service.http.threads import _in_one_moment, in_thread
+from sprag_study.service.storage.database.session import Moment, Session
 from tests.service.conftest import API
 from tests.service.http.api.test_one_moment import end
 
@@ -36,7 +36,7 @@ def reading(service: Service, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple
             rows.append(arguments[2])
 
     with monkeypatch.context() as patch:
-        patch.setattr("sprag.service.http.access.BELIEVED_SECONDS", math.inf)  # tokens are read again besides
+        patch.setattr("sprag_study.service.http.access.BELIEVED_SECONDS", math.inf)  # tokens are read again besides
         patch.setattr(service.store.session, "on_wait", lambda kind, _: begun.append(kind))
         sa.event.listen(sa.Engine, "before_cursor_execute", told)
         yield begun, rows

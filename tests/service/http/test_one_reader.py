@@ -14,15 +14,21 @@ import httpx
 import pytest
 from starlette.middleware import gzip
 
-from sprag.service.formats import FORMATS
-from sprag.service.http import guard, looks, work
-from sprag.service.http.api import results as results_of_api
-from sprag.service.http.compression import Compression
-from sprag.service.http.problems import ApiError
-from sprag.service.http.threads import _NUMBERS, ThreadedRoute, Threads
-from sprag.service.storage.people.scopes import TokenScope
-from sprag.service.views import row_files
-from sprag.worker.limits import FILE_PROCESSES, MAX_FILES_EACH, MAX_STREAMS_EACH, SENDING_PROCESSES, WRITING_THREADS
+from sprag_study.service.formats import FORMATS
+from sprag_study.service.http import guard, looks, work
+from sprag_study.service.http.api import results as results_of_api
+from sprag_study.service.http.compression import Compression
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.http.threads import _NUMBERS, ThreadedRoute, Threads
+from sprag_study.service.storage.people.scopes import TokenScope
+from sprag_study.service.views import row_files
+from sprag_study.worker.limits import (
+    FILE_PROCESSES,
+    MAX_FILES_EACH,
+    MAX_STREAMS_EACH,
+    SENDING_PROCESSES,
+    WRITING_THREADS,
+)
 from tests.service.conftest import API, Service
 
 if TYPE_CHECKING:
@@ -31,7 +37,7 @@ if TYPE_CHECKING:
     from anyio.from_thread import BlockingPortal
     from starlette.types import Receive, Scope, Send
 
-    from sprag.service.http.kept_files import KeptFiles
+    from sprag_study.service.http.kept_files import KeptFiles
 
 EXPORTS = 45
 STREAMS = 50

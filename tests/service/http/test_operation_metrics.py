@@ -17,13 +17,13 @@ import pytest
 from prometheus_client import CollectorRegistry, generate_latest
 from ruamel.yaml import YAML
 
-from sprag.service.http.app import create_app
-from sprag.service.http.operation_metrics import WORKER_STATES, OperationCollector
-from sprag.service.jobs.scheduler import Scheduler
-from sprag.service.schedules.outcomes import Result
-from sprag.service.settings import Settings
-from sprag.service.storage.store import Store
-from sprag.worker.reports import WorkerReport
+from sprag_study.service.http.app import create_app
+from sprag_study.service.http.operation_metrics import WORKER_STATES, OperationCollector
+from sprag_study.service.jobs.scheduler import Scheduler
+from sprag_study.service.schedules.outcomes import Result
+from sprag_study.service.settings import Settings
+from sprag_study.service.storage.store import Store
+from sprag_study.worker.reports import WorkerReport
 from tests.conftest import ROOT
 from tests.service.conftest import InThread, Service
 from tests.service.http.test_metrics import samples, value

@@ -14,14 +14,14 @@ import httpx
 import pytest
 from pydantic import SecretStr, ValidationError
 
-from sprag.service.client import Client
-from sprag.service.http.app import create_app
-from sprag.service.http.current import knowing
-from sprag.service.http.prefix import here
-from sprag.service.http.web.templates import _TRANSLATED, Addresses, _templates
-from sprag.service.presets import preset_names, preset_text
-from sprag.service.settings import Settings, UnsafeSettingsError
-from sprag.service.spec.document import load_spec
+from sprag_study.service.client import Client
+from sprag_study.service.http.app import create_app
+from sprag_study.service.http.current import knowing
+from sprag_study.service.http.prefix import here
+from sprag_study.service.http.web.templates import _TRANSLATED, Addresses, _templates
+from sprag_study.service.presets import preset_names, preset_text
+from sprag_study.service.settings import Settings, UnsafeSettingsError
+from sprag_study.service.spec.document import load_spec
 from tests.service.conftest import PortalTransport, Service
 
 if TYPE_CHECKING:
@@ -73,8 +73,8 @@ class OnlyBelow:
 @pytest.fixture
 def below(settings: Settings, connect: Callable[..., httpx.Client]) -> Iterator[tuple[Service, OnlyBelow]]:
     """A service at /sprag with studies of every preset."""
-    from sprag.service.http.app import chunking
-    from sprag.service.storage.store import Store
+    from sprag_study.service.http.app import chunking
+    from sprag_study.service.storage.store import Store
     from tests.service.conftest import InThread
 
     changed = settings.model_copy(update={"url_prefix": OWN})

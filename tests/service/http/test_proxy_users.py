@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import httpx
 import pytest
 
-from sprag.service.http import access
-from sprag.service.settings import Settings, UnsafeSettingsError
+from sprag_study.service.http import access
+from sprag_study.service.settings import Settings, UnsafeSettingsError
 from tests.service.http.people import OWN, Office
 from tests.service.timed_spec import SPEC
 

@@ -11,19 +11,19 @@ from fastapi import APIRouter, Depends, FastAPI
 from fastapi.routing import iter_route_contexts
 from starlette.requests import Request
 
-from sprag.service.actor import Role
-from sprag.service.http import access
-from sprag.service.http.access import Grant
-from sprag.service.http.guard import OPEN_PATHS
-from sprag.service.http.handlers import install
-from sprag.service.http.roles import LOOKING, ROLES, require_role, role_needed
-from sprag.service.storage.people.scopes import TokenScope
+from sprag_study.service.actor import Role
+from sprag_study.service.http import access
+from sprag_study.service.http.access import Grant
+from sprag_study.service.http.guard import OPEN_PATHS
+from sprag_study.service.http.handlers import install
+from sprag_study.service.http.roles import LOOKING, ROLES, require_role, role_needed
+from sprag_study.service.storage.people.scopes import TokenScope
 from tests.service.http.people import NAMES, OWN, Office
 from tests.service.http.routes import every_route
 from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
-    from sprag.service.settings import Settings
+    from sprag_study.service.settings import Settings
     from tests.service.conftest import Service
 
 STUDIES = "/api/v1/studies"

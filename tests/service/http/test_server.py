@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, cast
 import httpx
 import pytest
 
-from sprag.service.http import app
-from sprag.service.http.server import AddressError, Supervisor, serve
-from sprag.service.storage.errors import DatabaseError
-from sprag.worker.pool.child_pool import JobStoppedError
+from sprag_study.service.http import app
+from sprag_study.service.http.server import AddressError, Supervisor, serve
+from sprag_study.service.storage.errors import DatabaseError
+from sprag_study.worker.pool.child_pool import JobStoppedError
 from tests.worker.fakes import HandClock
 
 if TYPE_CHECKING:
-    from sprag.service.http.computer import ProcessComputer
-    from sprag.service.settings import Settings
+    from sprag_study.service.http.computer import ProcessComputer
+    from sprag_study.service.settings import Settings
     from tests.service.conftest import Service
 
 
@@ -175,8 +175,8 @@ def test_the_address_is_told_while_the_processes_that_check_still_start(
         workers_at_announcement.append(len(workers))
         threading.Thread(target=ask, args=(address,)).start()
 
-    monkeypatch.setattr("sprag.service.http.app._make_ready", never_ready)
-    monkeypatch.setattr("sprag.service.http.server.start_dispatcher_process", start)
+    monkeypatch.setattr("sprag_study.service.http.app._make_ready", never_ready)
+    monkeypatch.setattr("sprag_study.service.http.server.start_dispatcher_process", start)
     serve(settings.model_copy(update={"port": 0}), announce=announce)
     assert answers == [200, 503]
     assert workers_at_announcement == [0]

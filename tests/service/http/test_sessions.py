@@ -15,14 +15,14 @@ import httpx
 import pytest
 from pydantic import SecretStr
 
-from sprag.service.actor import Role
-from sprag.service.http import access
-from sprag.service.http.app import create_app
-from sprag.service.settings import Settings
-from sprag.service.storage.errors import TokenNotFoundError
-from sprag.service.storage.people.scopes import TokenScope
-from sprag.service.storage.store import Store
-from sprag.worker.states import StudyState
+from sprag_study.service.actor import Role
+from sprag_study.service.http import access
+from sprag_study.service.http.app import create_app
+from sprag_study.service.settings import Settings
+from sprag_study.service.storage.errors import TokenNotFoundError
+from sprag_study.service.storage.people.scopes import TokenScope
+from sprag_study.service.storage.store import Store
+from sprag_study.worker.states import StudyState
 from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
@@ -223,7 +223,7 @@ def test_a_session_ends_in_time_and_cannot_be_made_up(office: Office, monkeypatc
         assert stranger.get("/", headers=sent).status_code == 303, made_up
     assert browser.get("/").status_code == 200
     late = time.time() + access.SESSION_SECONDS + 1.0
-    monkeypatch.setattr("sprag.service.http.access.time.time", lambda: late)
+    monkeypatch.setattr("sprag_study.service.http.access.time.time", lambda: late)
     assert office.browser().get("/", headers={"Cookie": f"{access.COOKIE}={value}"}).status_code == 303
 
 

@@ -7,10 +7,10 @@ import logging
 import psycopg
 import pytest
 
-from sprag.service.http.sound_store import AGAIN_SECONDS, sound_store
-from sprag.service.settings import Settings
-from sprag.service.storage.errors import DatabaseError
-from sprag.worker.chunking import Chunking
+from sprag_study.service.http.sound_store import AGAIN_SECONDS, sound_store
+from sprag_study.service.settings import Settings
+from sprag_study.service.storage.errors import DatabaseError
+from sprag_study.worker.chunking import Chunking
 from tests.faults import refused
 
 CONNECT = psycopg.connect

@@ -10,8 +10,8 @@ from typing import Any
 import httpx
 import pytest
 
-from sprag.service.client import Client, RefusedError
-from sprag.service.settings import Settings
+from sprag_study.service.client import Client, RefusedError
+from sprag_study.service.settings import Settings
 from tests.service.conftest import API, PortalTransport, Service
 from tests.service.http.people import OWN, Office
 from tests.service.timed_spec import SPEC

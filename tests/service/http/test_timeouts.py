@@ -15,12 +15,12 @@ import uvicorn
 from uvicorn.protocols.http.flow_control import FlowControl
 from uvicorn.server import ServerState
 
-from sprag.service.http import guard
-from sprag.service.http.timeouts import READING, TimeoutProtocol
-from sprag.service.jobs.submission import accept
-from sprag.service.spec.document import parse_spec
-from sprag.worker import limits
-from sprag.worker.limits import MAX_STREAMS
+from sprag_study.service.http import guard
+from sprag_study.service.http.timeouts import READING, TimeoutProtocol
+from sprag_study.service.jobs.submission import accept
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.worker import limits
+from sprag_study.worker.limits import MAX_STREAMS
 from tests.service.conftest import API, Service
 
 #: Far less than a person waits, far more than a request takes.
@@ -190,7 +190,7 @@ def test_streams_of_events_have_a_number_of_places(service: Service) -> None:
 
 
 def test_the_queue_has_an_end(service: Service, monkeypatch: pytest.MonkeyPatch, spec: dict[str, Any]) -> None:
-    monkeypatch.setattr("sprag.service.jobs.submission.MAX_WAITING_STUDIES", 2)
+    monkeypatch.setattr("sprag_study.service.jobs.submission.MAX_WAITING_STUDIES", 2)
     first = service.submit()
     service.submit()
     refused = service.http.post(f"{API}/studies", json=spec)

@@ -12,10 +12,10 @@ from pathlib import Path
 import httpx
 import pytest
 
-from sprag.service.client import Client
-from sprag.service.client.errors import UntrustedError
-from sprag.service.http.tls import Certificate, CertificateError
-from sprag.service.settings import Settings
+from sprag_study.service.client import Client
+from sprag_study.service.client.errors import UntrustedError
+from sprag_study.service.http.tls import Certificate, CertificateError
+from sprag_study.service.settings import Settings
 from tests.acceptance.processes import service, sprag
 from tests.worker.executors.certificates import require_openssl
 

@@ -16,13 +16,13 @@ import psutil
 import pytest
 from starlette.requests import ClientDisconnect, Request
 
-from sprag.service.actor import Role
-from sprag.service.http.access import Grant
-from sprag.service.http.computer import Limits, ProcessComputer
-from sprag.service.http.problems import ApiError
-from sprag.service.http.shares import Shares
-from sprag.service.http.work import Work
-from sprag.worker import models
+from sprag_study.service.actor import Role
+from sprag_study.service.http.access import Grant
+from sprag_study.service.http.computer import Limits, ProcessComputer
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.http.shares import Shares
+from sprag_study.service.http.work import Work
+from sprag_study.worker import models
 from tests.service.conftest import API, InThread, Service
 from tests.worker import fakes
 
@@ -57,7 +57,7 @@ def test_time_is_limited_and_the_limit_is_named(portal: BlockingPortal, monkeypa
     try:
         with pytest.raises(ApiError, match=r"within 0\.5 s by the clock") as hung:
             portal.call(checker.run, signal.pause)
-        monkeypatch.setattr("sprag.service.http.computer.WALL_TIMES", 1e4)
+        monkeypatch.setattr("sprag_study.service.http.computer.WALL_TIMES", 1e4)
         named = r"within 0\.05 s of processor time, the limit of SPRAG_CHECK_TIMEOUT"
         with pytest.raises(ApiError, match=named) as busy:
             portal.call(checker.run, sum, range(10**12))
@@ -215,9 +215,9 @@ def test_what_has_to_be_compiled_first_is_compiled_by_the_engines_process(
     service: Service, portal: BlockingPortal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     press = service.get("/presets/press")["spec"]
-    monkeypatch.setattr("sprag.service.spec.machine.shaft_check._compiles_here", False)
+    monkeypatch.setattr("sprag_study.service.spec.machine.shaft_check._compiles_here", False)
     monkeypatch.setattr(
-        "sprag.service.spec.machine.shaft_check.is_compiled", lambda _shape: bool(service.computer.loads)
+        "sprag_study.service.spec.machine.shaft_check.is_compiled", lambda _shape: bool(service.computer.loads)
     )
     assert service.http.post(f"{API}/studies:preview", json=press).status_code == 200
     assert service.computer.loads

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from anyio.from_thread import BlockingPortal
 
-from sprag.service.http import read_ahead as ahead
-from sprag.service.http.read_ahead import read_ahead
-from sprag.service.storage.rows.columns import RowColumns
-from sprag.service.views import columns as module
-from sprag.service.views import explore
-from sprag.service.views.column_files import ColumnFiles
-from sprag.service.views.columns import Columns
-from sprag.worker.pool.child_pool import JobStoppedError
-from sprag.worker.states import StudyState
+from sprag_study.service.http import read_ahead as ahead
+from sprag_study.service.http.read_ahead import read_ahead
+from sprag_study.service.storage.rows.columns import RowColumns
+from sprag_study.service.views import columns as module
+from sprag_study.service.views import explore
+from sprag_study.service.views.column_files import ColumnFiles
+from sprag_study.service.views.columns import Columns
+from sprag_study.worker.pool.child_pool import JobStoppedError
+from sprag_study.worker.states import StudyState
 from tests.service.conftest import Service
 
 KINDS = (("ok", ""), ("chatter", "late,odd"))

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from sprag.service.jobs.housekeeping import Housekeeping
-from sprag.service.storage.errors import DatabaseBusyError, StudyNotFoundError
-from sprag.service.storage.store import Store
-from sprag.service.storage.studies import purging
-from sprag.service.storage.studies.records import StudyRecord
-from sprag.worker.chunking import Chunking
+from sprag_study.service.jobs.housekeeping import Housekeeping
+from sprag_study.service.storage.errors import DatabaseBusyError, StudyNotFoundError
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.studies import purging
+from sprag_study.service.storage.studies.records import StudyRecord
+from sprag_study.worker.chunking import Chunking
 from tests.contract.filling import finish
 from tests.worker import fakes
 
@@ -97,7 +97,7 @@ def test_a_purge_that_fails_is_tried_again(
         patch.setattr(store.purging, "steps", busy)
         keeping.purge()
     assert "removed later: busy" in caplog.text
-    monkeypatch.setattr("sprag.service.jobs.housekeeping.LOOK_SECONDS", 0.0)
+    monkeypatch.setattr("sprag_study.service.jobs.housekeeping.LOOK_SECONDS", 0.0)
     keeping.start()
     for _ in range(1000):
         if not count(store, "studies"):

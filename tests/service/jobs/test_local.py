@@ -16,18 +16,18 @@ import numpy as np
 import psutil
 import pytest
 
-from sprag.service.jobs import dispatching
-from sprag.service.jobs.dispatching import StopFlag, WorkerSettings, run_dispatcher, start_dispatcher_process
-from sprag.service.jobs.local import RunInterruptedError, StudyHeldError, run_here
-from sprag.service.storage.database.lock import DispatcherLock
-from sprag.service.storage.store import Store
-from sprag.service.storage.studies.records import Progress
-from sprag.service.storage.work import room
-from sprag.worker import models
-from sprag.worker.chunking import Chunking
-from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.ports import EpochLostError, Executor
-from sprag.worker.states import StudyState
+from sprag_study.service.jobs import dispatching
+from sprag_study.service.jobs.dispatching import StopFlag, WorkerSettings, run_dispatcher, start_dispatcher_process
+from sprag_study.service.jobs.local import RunInterruptedError, StudyHeldError, run_here
+from sprag_study.service.storage.database.lock import DispatcherLock
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.studies.records import Progress
+from sprag_study.service.storage.work import room
+from sprag_study.worker import models
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.executors.inline import InlineExecutor
+from sprag_study.worker.ports import EpochLostError, Executor
+from sprag_study.worker.states import StudyState
 from tests.conftest import Finished
 from tests.worker import fakes
 
@@ -224,7 +224,7 @@ def test_a_dispatcher_process_runs_studies_and_ends_in_order(url: str) -> None:
 
 PARENT = """
 import os, sys
-from sprag.service.jobs.dispatching import WorkerSettings, start_dispatcher_process
+from sprag_study.service.jobs.dispatching import WorkerSettings, start_dispatcher_process
 if __name__ == "__main__":
     print(start_dispatcher_process(WorkerSettings(sys.argv[1], 2, 600.0)).pid, flush=True)
     sys.stdin.read()
@@ -336,7 +336,7 @@ def test_ctrl_c_tells_what_is_kept_and_how_to_go_on(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("sprag.service.jobs.local.Dispatcher.run", interrupt)
+        patch.setattr("sprag_study.service.jobs.local.Dispatcher.run", interrupt)
         stopped = sprag("run", examples / "press.toml", "--db", tmp_path / "kept.sqlite3", "-o", tmp_path / "rows.csv")
     assert stopped.code == 130
     assert "is cancelled: 0 of" in stopped.err

@@ -10,20 +10,20 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from sprag.service.cli.app import execute
-from sprag.service.jobs.dispatching import worker_settings
-from sprag.service.jobs.maintenance import Maintenance, MaintenancePlan, backups
-from sprag.service.jobs.submission import accept
-from sprag.service.spec.document import parse_spec
-from sprag.service.storage.errors import StudyNotFoundError
-from sprag.service.storage.store import Store
+from sprag_study.service.cli.app import execute
+from sprag_study.service.jobs.dispatching import worker_settings
+from sprag_study.service.jobs.maintenance import Maintenance, MaintenancePlan, backups
+from sprag_study.service.jobs.submission import accept
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.storage.errors import StudyNotFoundError
+from sprag_study.service.storage.store import Store
 from tests.service.timed_spec import SPEC
 from tests.worker.fakes import HandClock
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from sprag.service.settings import Settings
+    from sprag_study.service.settings import Settings
 
 DAY = 86_400.0  # s
 

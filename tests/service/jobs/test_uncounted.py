@@ -12,12 +12,12 @@ from typing import Any
 
 import pytest
 
-from sprag.service.figures.pictures import picture_file
-from sprag.service.jobs import checks
-from sprag.service.spec.document import parse_spec
-from sprag.worker import models
-from sprag.worker.pool import child_process
-from sprag.worker.pool.child_process import ChildProcess, uncounted
+from sprag_study.service.figures.pictures import picture_file
+from sprag_study.service.jobs import checks
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.worker import models
+from sprag_study.worker.pool import child_process
+from sprag_study.worker.pool.child_process import ChildProcess, uncounted
 from tests.worker import fakes
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"/>'

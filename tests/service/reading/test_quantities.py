@@ -13,24 +13,24 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from sprag.sentences import Amount, Name
-from sprag.service.exports import read_table
-from sprag.service.faults import SelectionError
-from sprag.service.figures.curves import curves_figure
-from sprag.service.figures.pictures import draw_figure
-from sprag.service.figures.read import read_figure, read_map
-from sprag.service.figures.svg_map import picture_map
-from sprag.service.http.views import preset_of
-from sprag.service.reading.quantities import KINDS, UNITS_PATTERN, Units, read_units, typed_units, units_for
-from sprag.service.reading.reader import CODES, Choice, Phrase, Reading, reading_for
-from sprag.service.reading.units import parse_quantity
-from sprag.service.reading.wording import unit_text
-from sprag.service.results.curve_cases import draw, draw_map, select
-from sprag.service.results.curves import CurveQuery
-from sprag.service.spec.document import parse_spec
-from sprag.service.storage.studies.records import CaseColumns
-from sprag.worker import models
-from sprag.worker.models.vocabulary import caption
+from sprag_study.sentences import Amount, Name
+from sprag_study.service.exports import read_table
+from sprag_study.service.faults import SelectionError
+from sprag_study.service.figures.curves import curves_figure
+from sprag_study.service.figures.pictures import draw_figure
+from sprag_study.service.figures.read import read_figure, read_map
+from sprag_study.service.figures.svg_map import picture_map
+from sprag_study.service.http.views import preset_of
+from sprag_study.service.reading.quantities import KINDS, UNITS_PATTERN, Units, read_units, typed_units, units_for
+from sprag_study.service.reading.reader import CODES, Choice, Phrase, Reading, reading_for
+from sprag_study.service.reading.units import parse_quantity
+from sprag_study.service.reading.wording import unit_text
+from sprag_study.service.results.curve_cases import draw, draw_map, select
+from sprag_study.service.results.curves import CurveQuery
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.storage.studies.records import CaseColumns
+from sprag_study.worker import models
+from sprag_study.worker.models.vocabulary import caption
 from tests.service.figures.seen import seen
 from tests.service.spec_sample import changed
 
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
     from tests.service.conftest import Service
 
 #: Each unit in SI, by hand.

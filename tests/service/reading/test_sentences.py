@@ -14,7 +14,7 @@ from typing import get_args
 import pytest
 
 from docs.catalogues import of_code
-from sprag.sentences import (
+from sprag_study.sentences import (
     Amount,
     Clause,
     Name,
@@ -27,17 +27,17 @@ from sprag.sentences import (
     plural,
     sentence_of,
 )
-from sprag.service.cli.console import warning_lines
-from sprag.service.faults import FaultError, WarningCode
-from sprag.service.http.handlers import as_api_error
-from sprag.service.languages import gettext, language
-from sprag.service.languages.recorded import MANY_STUDIES, NOT_IN_TIME
-from sprag.service.reading.quantities import Units
-from sprag.service.reading.reader import Phrase, Reading, shown, told
-from sprag.service.storage.errors import StudyNotFoundError
-from sprag.service.storage.stored_sentences import read_warnings, write_warnings
-from sprag.worker.ports import StoreError
-from sprag.worker.states import StudyEvent, StudyState, TransitionError
+from sprag_study.service.cli.console import warning_lines
+from sprag_study.service.faults import FaultError, WarningCode
+from sprag_study.service.http.handlers import as_api_error
+from sprag_study.service.languages import gettext, language
+from sprag_study.service.languages.recorded import MANY_STUDIES, NOT_IN_TIME
+from sprag_study.service.reading.quantities import Units
+from sprag_study.service.reading.reader import Phrase, Reading, shown, told
+from sprag_study.service.storage.errors import StudyNotFoundError
+from sprag_study.service.storage.stored_sentences import read_warnings, write_warnings
+from sprag_study.worker.ports import StoreError
+from sprag_study.worker.states import StudyEvent, StudyState, TransitionError
 from tests.conftest import ROOT
 from tests.service import warning_samples
 

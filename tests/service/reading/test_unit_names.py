@@ -9,8 +9,8 @@ from typing import Final
 
 import pytest
 
-from sprag.service.reading.unit_names import DEFINITIONS, resolved
-from sprag.service.reading.units import QuantityError, measure, parse_quantity
+from sprag_study.service.reading.unit_names import DEFINITIONS, resolved
+from sprag_study.service.reading.units import QuantityError, measure, parse_quantity
 
 #: What a mechanical engineer means by a symbol, as factor and powers of kg, m, s and rad: written down here once more.
 _TURN: Final = "6.2831853071795864769252867665590057683943387987502"

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sprag.service.reading.units import QuantityError, example, parse_exact, parse_quantity, split_quantity
-from sprag.worker.models import model_names, parameter_catalogue
+from sprag_study.service.reading.units import QuantityError, example, parse_exact, parse_quantity, split_quantity
+from sprag_study.worker.models import model_names, parameter_catalogue
 
 ALL_UNITS = sorted({entry.unit.replace("^K", "^2") for model in model_names() for entry in parameter_catalogue(model)})
 

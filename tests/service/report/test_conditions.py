@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from sprag.service import languages
-from sprag.service.reading.reader import Choice, Reading
-from sprag.service.report.blocks import Document, Table, Text
-from sprag.service.report.document import document_of
-from sprag.service.results.shown_inputs import inputs, varying
-from sprag.service.results.varied import listed, tolerances_of
-from sprag.service.views.library import Library
-from sprag.service.views.study_questions import ReportQuestion
+from sprag_study.service import languages
+from sprag_study.service.reading.reader import Choice, Reading
+from sprag_study.service.report.blocks import Document, Table, Text
+from sprag_study.service.report.document import document_of
+from sprag_study.service.results.shown_inputs import inputs, varying
+from sprag_study.service.results.varied import listed, tolerances_of
+from sprag_study.service.views.library import Library
+from sprag_study.service.views.study_questions import ReportQuestion
 from tests.service.http.web.test_accessibility import preset
 from tests.service.report.test_two_pages import finished
 from tests.service.searching import search

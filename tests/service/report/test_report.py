@@ -14,23 +14,23 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.faults import FaultError
-from sprag.service.presets import preset_text
-from sprag.service.reading.reader import Choice
-from sprag.service.reading.wording import number
-from sprag.service.report import Office, write_report
-from sprag.service.report.blocks import Document, Image, Section, Table, Text
-from sprag.service.report.content import AS_TYPED, Report, ranges
-from sprag.service.report.document import document_of, report_of
-from sprag.service.report.drawn import drawing_images
-from sprag.service.report.pdf import pdf_report
-from sprag.service.spec.document import load_spec
-from sprag.service.storage.errors import DatabaseError
-from sprag.service.storage.rows import digests
-from sprag.service.storage.tables import results_table
-from sprag.service.views.library import Library
-from sprag.service.views.study_questions import ReportQuestion
-from sprag.worker import models
+from sprag_study.service.faults import FaultError
+from sprag_study.service.presets import preset_text
+from sprag_study.service.reading.reader import Choice
+from sprag_study.service.reading.wording import number
+from sprag_study.service.report import Office, write_report
+from sprag_study.service.report.blocks import Document, Image, Section, Table, Text
+from sprag_study.service.report.content import AS_TYPED, Report, ranges
+from sprag_study.service.report.document import document_of, report_of
+from sprag_study.service.report.drawn import drawing_images
+from sprag_study.service.report.pdf import pdf_report
+from sprag_study.service.spec.document import load_spec
+from sprag_study.service.storage.errors import DatabaseError
+from sprag_study.service.storage.rows import digests
+from sprag_study.service.storage.tables import results_table
+from sprag_study.service.views.library import Library
+from sprag_study.service.views.study_questions import ReportQuestion
+from sprag_study.worker import models
 from tests.faults import refused
 
 if TYPE_CHECKING:
@@ -188,7 +188,7 @@ def test_versions_and_the_hash_of_the_spec_are_told(service: Service) -> None:
     spec = service.get(f"/studies/{study_id}")["spec"]
     canonical = json.dumps(spec, sort_keys=True, separators=(",", ":"))
     assert told["SHA-256 of the spec"] == hashlib.sha256(canonical.encode()).hexdigest()
-    assert told["version of Sprag"] == version("sprag")
+    assert told["version of Sprag"] == version("sprag-study")
 
 
 def test_the_machine_with_its_values_and_its_clutch_are_drawn(service: Service) -> None:

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from sprag.service import languages
-from sprag.service.reading.reader import Choice, reading_for
-from sprag.service.results.shown_inputs import run_settings
-from sprag.service.spec.document import load_spec, parse_spec
+from sprag_study.service import languages
+from sprag_study.service.reading.reader import Choice, reading_for
+from sprag_study.service.results.shown_inputs import run_settings
+from sprag_study.service.spec.document import load_spec, parse_spec
 from tests.service.conftest import API
 
 if TYPE_CHECKING:

@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING, Any, Final
 
 import pytest
 
-from sprag.sentences import Amount, Sentence
-from sprag.service import languages
-from sprag.service.presets import preset_names
-from sprag.service.reading.numbers import in_language
-from sprag.service.reading.reader import Choice
-from sprag.service.reading.units import parse_quantity
-from sprag.service.reading.wording import unit_text
-from sprag.service.report import Office, write_report
-from sprag.service.report.blocks import said
-from sprag.service.report.document import made_document, report_of, sections_of
-from sprag.service.views.library import Library
-from sprag.service.views.study_questions import ReportQuestion
-from sprag.worker import models
+from sprag_study.sentences import Amount, Sentence
+from sprag_study.service import languages
+from sprag_study.service.presets import preset_names
+from sprag_study.service.reading.numbers import in_language
+from sprag_study.service.reading.reader import Choice
+from sprag_study.service.reading.units import parse_quantity
+from sprag_study.service.reading.wording import unit_text
+from sprag_study.service.report import Office, write_report
+from sprag_study.service.report.blocks import said
+from sprag_study.service.report.document import made_document, report_of, sections_of
+from sprag_study.service.views.library import Library
+from sprag_study.service.views.study_questions import ReportQuestion
+from sprag_study.worker import models
 from tests.service import refined_study
 from tests.service.calibrating import calibration
 from tests.service.http.web.test_accessibility import preset
@@ -30,7 +30,7 @@ from tests.service.searching import search
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from sprag.service.report.content import Report
+    from sprag_study.service.report.content import Report
     from tests.service.conftest import Service
 
 #: Kinds of studies that choose their own cases are run by formulas; all others are presets with made-up rows.

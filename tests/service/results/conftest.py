@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 from anyio.from_thread import BlockingPortal
 
-from sprag.service.client import Client
+from sprag_study.service.client import Client
 from tests.service.conftest import PortalTransport, Service
 from tests.service.results.settled import settled
 
@@ -16,13 +16,13 @@ Linked = Callable[[str], None]
 
 @pytest.fixture
 def linked(service: Service, portal: BlockingPortal, monkeypatch: pytest.MonkeyPatch) -> Linked:
-    """Lets the commands of a module of `sprag.service.cli` talk to the service of the test."""
+    """Lets the commands of a module of `sprag_study.service.cli` talk to the service of the test."""
 
     def connected(*_: object) -> Client:
         return Client("http://localhost", transport=PortalTransport(service.app, portal))
 
     def link(module: str) -> None:
-        monkeypatch.setattr(f"sprag.service.cli.{module}.connection", connected)
+        monkeypatch.setattr(f"sprag_study.service.cli.{module}.connection", connected)
 
     return link
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from sprag.engine.vibration_drive.regimes import Regime
-from sprag.worker import models
-from sprag.worker.models import ChunkResult
-from sprag.worker.study import Study
+from sprag_study.engine.vibration_drive.regimes import Regime
+from sprag_study.worker import models
+from sprag_study.worker.models import ChunkResult
+from sprag_study.worker.study import Study
 from tests.service.conftest import Service, made_up
 from tests.service.spec_sample import changed
 

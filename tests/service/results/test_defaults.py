@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.results.curve_cases import select
-from sprag.service.results.defaults import caption, drawn_numbers, main_query
-from sprag.service.spec.document import parse_spec
-from sprag.worker import models
+from sprag_study.service.results.curve_cases import select
+from sprag_study.service.results.defaults import caption, drawn_numbers, main_query
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
-    from sprag.service.results.curves import CurveQuery
+    from sprag_study.service.results.curves import CurveQuery
 
 
 def query_of(spec: dict[str, Any], **changes: Any) -> CurveQuery | None:

@@ -9,18 +9,18 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sprag.service.faults import SelectionError
-from sprag.service.figures.explore import explore_figure
-from sprag.service.http.web.rows.lines import HEIGHT, TOP, lines_of
-from sprag.service.results.explore import ExploreQuery, explore, explored_json, histogram, plan_of
-from sprag.service.spec.document import parse_spec
-from sprag.service.storage.rows.columns import RowColumns
-from sprag.worker import models
-from sprag.worker.study import Axis
+from sprag_study.service.faults import SelectionError
+from sprag_study.service.figures.explore import explore_figure
+from sprag_study.service.http.web.rows.lines import HEIGHT, TOP, lines_of
+from sprag_study.service.results.explore import ExploreQuery, explore, explored_json, histogram, plan_of
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.storage.rows.columns import RowColumns
+from sprag_study.worker import models
+from sprag_study.worker.study import Axis
 
 if TYPE_CHECKING:
-    from sprag.service.results.explore import Explored
-    from sprag.worker.study import Study
+    from sprag_study.service.results.explore import Explored
+    from sprag_study.worker.study import Study
 
 AXES = [
     {"path": "shaft.load", "linspace": [0.0, 1.0, 11]},

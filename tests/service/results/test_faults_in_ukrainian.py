@@ -7,17 +7,17 @@ from datetime import UTC, datetime
 
 import pytest
 
-from sprag.service.faults import FaultError
-from sprag.service.languages import language
-from sprag.service.reading.faults import allowed_text, fault_text
-from sprag.service.results.curve_cases import select
-from sprag.service.results.curves import CurveQuery
-from sprag.service.results.explore import ExploreQuery, plan_of
-from sprag.service.results.selection import locate_axes, numeric_results, require_axis
-from sprag.service.schedules.fields import read_fields
-from sprag.service.spec.document import parse_spec
-from sprag.service.views.branch import range_of
-from sprag.worker import models
+from sprag_study.service.faults import FaultError
+from sprag_study.service.languages import language
+from sprag_study.service.reading.faults import allowed_text, fault_text
+from sprag_study.service.results.curve_cases import select
+from sprag_study.service.results.curves import CurveQuery
+from sprag_study.service.results.explore import ExploreQuery, plan_of
+from sprag_study.service.results.selection import locate_axes, numeric_results, require_axis
+from sprag_study.service.schedules.fields import read_fields
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.views.branch import range_of
+from sprag_study.worker import models
 from tests.service.spec_sample import SPEC
 
 STUDY = parse_spec(SPEC).study

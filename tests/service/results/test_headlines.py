@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.service.languages import language
-from sprag.service.reading.quantities import Units
-from sprag.service.reading.reader import Reading
-from sprag.service.results.headlines.along import along_headline
-from sprag.service.results.headlines.headline import digits
-from sprag.service.results.key_answers import answers_query, find_answers
-from sprag.worker import models
+from sprag_study.service.languages import language
+from sprag_study.service.reading.quantities import Units
+from sprag_study.service.reading.reader import Reading
+from sprag_study.service.results.headlines.along import along_headline
+from sprag_study.service.results.headlines.headline import digits
+from sprag_study.service.results.key_answers import answers_query, find_answers
+from sprag_study.worker import models
 from tests.service.results.test_key_answers import Rows, study_of
 
 READING = Reading("vibration-drive", Units({"rad/s": "rpm", "1": "%"}))

@@ -9,24 +9,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sprag.engine import Ending
-from sprag.sentences import Amount, Sentence, WarningText
-from sprag.service import languages
-from sprag.service.faults import Fault
-from sprag.service.figures.branch import special_text
-from sprag.service.figures.figure import Figure, Line, Note, Panel, Quantity
-from sprag.service.figures.orders import motion_text
-from sprag.service.figures.pictures import draw_figure
-from sprag.service.figures.read import read_figure
-from sprag.service.figures.svg import svg
-from sprag.service.languages.elsewhere import speak
-from sprag.service.reading.faults import allowed_text, fault_text
-from sprag.service.reading.reader import CODES, Phrase, Reading, joined, part_label, plural, shown, term, titled
-from sprag.service.reading.wording import typed_text, unit_text
-from sprag.service.results.key_answer_words import curve_named
-from sprag.service.results.tolerances.conditions import read_conditions
-from sprag.worker.models import ResultInfo
-from sprag.worker.models.branches import BranchContact, SpecialPoint
+from sprag_study.engine import Ending
+from sprag_study.sentences import Amount, Sentence, WarningText
+from sprag_study.service import languages
+from sprag_study.service.faults import Fault
+from sprag_study.service.figures.branch import special_text
+from sprag_study.service.figures.figure import Figure, Line, Note, Panel, Quantity
+from sprag_study.service.figures.orders import motion_text
+from sprag_study.service.figures.pictures import draw_figure
+from sprag_study.service.figures.read import read_figure
+from sprag_study.service.figures.svg import svg
+from sprag_study.service.languages.elsewhere import speak
+from sprag_study.service.reading.faults import allowed_text, fault_text
+from sprag_study.service.reading.reader import CODES, Phrase, Reading, joined, part_label, plural, shown, term, titled
+from sprag_study.service.reading.wording import typed_text, unit_text
+from sprag_study.service.results.key_answer_words import curve_named
+from sprag_study.service.results.tolerances.conditions import read_conditions
+from sprag_study.worker.models import ResultInfo
+from sprag_study.worker.models.branches import BranchContact, SpecialPoint
 from tests.service.figures.seen import seen
 
 DRIVE, SHAFT = Reading("vibration-drive"), Reading("machine-shaft")

@@ -10,22 +10,22 @@ import numpy as np
 import pytest
 from scipy.interpolate import interp1d
 
-from sprag.service.faults import SelectionError
-from sprag.service.figures.answers import answers_figure
-from sprag.service.figures.svg import svg
-from sprag.service.results.curves import CurveQuery
-from sprag.service.results.key_answer_words import answer_facts, note_of, report
-from sprag.service.results.key_answers import answers_query, find_answers
-from sprag.service.spec.document import parse_spec
-from sprag.service.storage.studies.records import CaseColumns
-from sprag.worker import models
+from sprag_study.service.faults import SelectionError
+from sprag_study.service.figures.answers import answers_figure
+from sprag_study.service.figures.svg import svg
+from sprag_study.service.results.curves import CurveQuery
+from sprag_study.service.results.key_answer_words import answer_facts, note_of, report
+from sprag_study.service.results.key_answers import answers_query, find_answers
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.storage.studies.records import CaseColumns
+from sprag_study.worker import models
 from tests.service.figures.seen import seen
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.results.key_answers import CurveAnswers, Found, StudyAnswers
-    from sprag.worker.study import Study
+    from sprag_study.service.results.key_answers import CurveAnswers, Found, StudyAnswers
+    from sprag_study.worker.study import Study
 
 #: No-load speed (rad/s) at an amplitude of 1 m, stall torque (N*m).
 SPEED, STALL = 20.0, 1.0

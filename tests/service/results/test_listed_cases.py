@@ -11,23 +11,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from sprag.service.faults import SelectionError
-from sprag.service.results.choice import Address, characteristic, curve_query, held
-from sprag.service.results.curve_cases import draw, select
-from sprag.service.results.curves import CurveQuery
-from sprag.service.results.defaults import completed, main_query, no_curves
-from sprag.service.results.key_answers import answers_query, find_answers
-from sprag.service.spec.document import parse_spec
-from sprag.service.storage.studies.records import CaseColumns
-from sprag.worker import models
+from sprag_study.service.faults import SelectionError
+from sprag_study.service.results.choice import Address, characteristic, curve_query, held
+from sprag_study.service.results.curve_cases import draw, select
+from sprag_study.service.results.curves import CurveQuery
+from sprag_study.service.results.defaults import completed, main_query, no_curves
+from sprag_study.service.results.key_answers import answers_query, find_answers
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.storage.studies.records import CaseColumns
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from sprag.service.results.key_answers import StudyAnswers
-    from sprag.worker.study import Study
+    from sprag_study.service.results.key_answers import StudyAnswers
+    from sprag_study.worker.study import Study
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 LOAD, FREQUENCY = "shaft.load", "excitation.frequency"

@@ -14,22 +14,22 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sprag.service.figures.curves import curves_figure
-from sprag.service.figures.figure import BANDS, Figure, Line
-from sprag.service.figures.svg import svg
-from sprag.service.reading.quantities import Units
-from sprag.service.reading.reader import Reading
-from sprag.service.reading.wording import percent
-from sprag.service.report.document import report_of
-from sprag.service.results.curve_cases import draw, select
-from sprag.service.results.curves import CurveQuery, Curves
-from sprag.service.results.defaults import completed, main_query
-from sprag.service.results.rounds import sentence
-from sprag.service.storage.studies.records import CaseColumns, RoundProgress, RoundRecord
-from sprag.service.views.library import Library
-from sprag.worker import models
-from sprag.worker.states import StudyState
-from sprag.worker.study import Study
+from sprag_study.service.figures.curves import curves_figure
+from sprag_study.service.figures.figure import BANDS, Figure, Line
+from sprag_study.service.figures.svg import svg
+from sprag_study.service.reading.quantities import Units
+from sprag_study.service.reading.reader import Reading
+from sprag_study.service.reading.wording import percent
+from sprag_study.service.report.document import report_of
+from sprag_study.service.results.curve_cases import draw, select
+from sprag_study.service.results.curves import CurveQuery, Curves
+from sprag_study.service.results.defaults import completed, main_query
+from sprag_study.service.results.rounds import sentence
+from sprag_study.service.storage.studies.records import CaseColumns, RoundProgress, RoundRecord
+from sprag_study.service.views.library import Library
+from sprag_study.worker import models
+from sprag_study.worker.states import StudyState
+from sprag_study.worker.study import Study
 from tests.service.conftest import API, Service
 from tests.service.figures.seen import seen
 from tests.service.refined_study import EFFICIENCY, JUMP, SPEC, SPEED, TORQUE, fetched, fill, study_of

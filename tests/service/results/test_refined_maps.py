@@ -11,20 +11,20 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sprag.service.cli.shown import show_map
-from sprag.service.faults import SelectionError
-from sprag.service.figures.orders import map_edges
-from sprag.service.figures.pictures import draw_map as paint_map
-from sprag.service.figures.svg_map import map_svg
-from sprag.service.report import Office, write_report
-from sprag.service.report.document import made_document, report_of
-from sprag.service.results.curve_cases import draw_map
-from sprag.service.results.curves import Map
-from sprag.service.storage.studies.records import CaseColumns
-from sprag.service.views.library import Library
-from sprag.service.views.study_questions import ReportQuestion
-from sprag.worker import models
-from sprag.worker.study import Study
+from sprag_study.service.cli.shown import show_map
+from sprag_study.service.faults import SelectionError
+from sprag_study.service.figures.orders import map_edges
+from sprag_study.service.figures.pictures import draw_map as paint_map
+from sprag_study.service.figures.svg_map import map_svg
+from sprag_study.service.report import Office, write_report
+from sprag_study.service.report.document import made_document, report_of
+from sprag_study.service.results.curve_cases import draw_map
+from sprag_study.service.results.curves import Map
+from sprag_study.service.storage.studies.records import CaseColumns
+from sprag_study.service.views.library import Library
+from sprag_study.service.views.study_questions import ReportQuestion
+from sprag_study.worker import models
+from sprag_study.worker.study import Study
 from tests.service.conftest import API, Service
 from tests.service.figures.seen import seen
 from tests.service.refined_study import EFFICIENCY, JUMP, MAP, SPEED, TORQUE, fetched, fill, map_value, study_of

@@ -8,21 +8,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sprag.sentences import Amount
-from sprag.service.figures.curves import curves_figure, doubtful_marks
-from sprag.service.figures.pictures import draw_compare, draw_curves
-from sprag.service.figures.pictures import draw_map as paint_map
-from sprag.service.figures.svg import svg
-from sprag.service.http.web.motion import _said
-from sprag.service.languages import language
-from sprag.service.reading.reader import Reading, shown
-from sprag.service.results.curve_cases import draw, draw_map, select
-from sprag.service.results.curves import CurveQuery, Curves
-from sprag.service.results.regimes import MARKS, coasting_sentence, counted, regimes_of, stretches
-from sprag.service.spec.document import parse_spec
-from sprag.service.storage.studies.records import CaseColumns, CaseRow
-from sprag.worker import models
-from sprag.worker.study import Study
+from sprag_study.sentences import Amount
+from sprag_study.service.figures.curves import curves_figure, doubtful_marks
+from sprag_study.service.figures.pictures import draw_compare, draw_curves
+from sprag_study.service.figures.pictures import draw_map as paint_map
+from sprag_study.service.figures.svg import svg
+from sprag_study.service.http.web.motion import _said
+from sprag_study.service.languages import language
+from sprag_study.service.reading.reader import Reading, shown
+from sprag_study.service.results.curve_cases import draw, draw_map, select
+from sprag_study.service.results.curves import CurveQuery, Curves
+from sprag_study.service.results.regimes import MARKS, coasting_sentence, counted, regimes_of, stretches
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.storage.studies.records import CaseColumns, CaseRow
+from sprag_study.worker import models
+from sprag_study.worker.study import Study
 from tests.acceptance.processes import EXAMPLES
 from tests.service.figures.seen import seen
 from tests.service.spec_sample import changed

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from sprag.service.client import Client
+from sprag_study.service.client import Client
 from tests.service.conftest import API, PortalTransport, Service
 from tests.service.results.conftest import Linked
 from tests.service.results.settled import flagged

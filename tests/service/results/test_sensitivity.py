@@ -12,18 +12,18 @@ import pytest
 from SALib.analyze import morris as morris_analyze
 from SALib.sample import morris as morris_sample
 
-from sprag.service.answers import results
-from sprag.service.cli.shown import _show_effects
-from sprag.service.faults import SelectionError
-from sprag.service.reading.wording import number as number_text
-from sprag.service.results.curves import Fetch
-from sprag.service.results.sensitivity import sensitivity
-from sprag.service.results.unaffected import unaffected
-from sprag.service.spec.draws.unit import LEVELS
-from sprag.service.storage.studies.records import CaseColumns
-from sprag.worker import models
-from sprag.worker.models import ChunkResult
-from sprag.worker.study import Study
+from sprag_study.service.answers import results
+from sprag_study.service.cli.shown import _show_effects
+from sprag_study.service.faults import SelectionError
+from sprag_study.service.reading.wording import number as number_text
+from sprag_study.service.results.curves import Fetch
+from sprag_study.service.results.sensitivity import sensitivity
+from sprag_study.service.results.unaffected import unaffected
+from sprag_study.service.spec.draws.unit import LEVELS
+from sprag_study.service.storage.studies.records import CaseColumns
+from sprag_study.worker import models
+from sprag_study.worker.models import ChunkResult
+from sprag_study.worker.study import Study
 from tests.service.shapes import fits
 from tests.service.spec_sample import parsed
 

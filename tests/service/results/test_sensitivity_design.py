@@ -11,13 +11,13 @@ import pytest
 from SALib.analyze import rbd_fast
 from scipy.stats import qmc
 
-from sprag.service.cli.shown import _show_effects
-from sprag.service.figures.pictures import draw_sensitivity
-from sprag.service.reading.quantities import Units
-from sprag.service.reading.reader import CODES, Reading
-from sprag.service.results.sensitivity import Sensitivity
-from sprag.service.results.sensitivity_design import is_sample
-from sprag.service.views.sensitivity import indices_csv
+from sprag_study.service.cli.shown import _show_effects
+from sprag_study.service.figures.pictures import draw_sensitivity
+from sprag_study.service.reading.quantities import Units
+from sprag_study.service.reading.reader import CODES, Reading
+from sprag_study.service.results.sensitivity import Sensitivity
+from sprag_study.service.results.sensitivity_design import is_sample
+from sprag_study.service.views.sensitivity import indices_csv
 from tests.service.results.test_sensitivity import API, SPEED, effects, ranges
 
 if TYPE_CHECKING:

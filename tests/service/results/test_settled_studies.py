@@ -15,11 +15,11 @@ import pytest
 import xarray as xr
 from anyio.from_thread import BlockingPortal
 
-from sprag.engine.vibration_drive.regimes import Regime
-from sprag.service.client import AsyncClient, Client
-from sprag.service.results.regimes import motion_sentence
-from sprag.worker import models
-from sprag.worker.models import ChunkResult, regime_info
+from sprag_study.engine.vibration_drive.regimes import Regime
+from sprag_study.service.client import AsyncClient, Client
+from sprag_study.service.results.regimes import motion_sentence
+from sprag_study.worker import models
+from sprag_study.worker.models import ChunkResult, regime_info
 from tests.service.conftest import API, PortalTransport, Service
 from tests.service.results.conftest import Linked
 from tests.service.results.settled import REGIMES, flagged, rows_of

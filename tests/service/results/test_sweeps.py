@@ -13,23 +13,23 @@ import pandas as pd
 import pytest
 from anyio.from_thread import BlockingPortal
 
-from sprag.service.cli.shown import held_text
-from sprag.service.client import AsyncClient, Client
-from sprag.service.client.frames import Curves, grid_of, table_of
-from sprag.service.figures.curves import curves_figure
-from sprag.service.figures.svg import svg
-from sprag.service.http.web.form.spec import field_of, spec_of, values_of
-from sprag.service.jobs.local import run_here
-from sprag.service.jobs.start_from import with_start
-from sprag.service.results.curves import CurveQuery
-from sprag.service.results.defaults import main_query
-from sprag.service.results.stored_curves import stored_curves
-from sprag.service.results.sweeps import hysteresis
-from sprag.service.spec.document import parse_spec
-from sprag.service.spec.narrow import narrowed_spec
-from sprag.worker import models
-from sprag.worker.models.starts import motion_of
-from sprag.worker.study import Study
+from sprag_study.service.cli.shown import held_text
+from sprag_study.service.client import AsyncClient, Client
+from sprag_study.service.client.frames import Curves, grid_of, table_of
+from sprag_study.service.figures.curves import curves_figure
+from sprag_study.service.figures.svg import svg
+from sprag_study.service.http.web.form.spec import field_of, spec_of, values_of
+from sprag_study.service.jobs.local import run_here
+from sprag_study.service.jobs.start_from import with_start
+from sprag_study.service.results.curves import CurveQuery
+from sprag_study.service.results.defaults import main_query
+from sprag_study.service.results.stored_curves import stored_curves
+from sprag_study.service.results.sweeps import hysteresis
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.narrow import narrowed_spec
+from sprag_study.worker import models
+from sprag_study.worker.models.starts import motion_of
+from sprag_study.worker.study import Study
 from tests.service.conftest import API, PortalTransport, Service
 from tests.service.figures.seen import seen
 from tests.service.spec_sample import changed
@@ -175,7 +175,7 @@ def test_jumps_are_narrowed_over_http_by_clients_a_command_and_a_button(
     with Client("http://localhost", transport=transport) as client:
         ids = [client.study(study_id).narrow(4, at={"shaft.load": "0.1 N*m", "sweep": "up"}).id, portal.call(narrowed)]
     monkeypatch.setattr(
-        "sprag.service.cli.extend.connection", lambda *_: Client("http://localhost", transport=transport)
+        "sprag_study.service.cli.extend.connection", lambda *_: Client("http://localhost", transport=transport)
     )
     done = sprag("narrow", study_id, "--steps", 4, "--at", "shaft.load=0.1", "--at", "sweep=up", "--json")
     assert done.code == 0, done.err

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import pytest
 
-from sprag.engine.machine_shaft.transient_causes import ROUGH_LOAD, Ends, cause_of
-from sprag.engine.machine_shaft.transient_run import _FIXED_DRIVE
-from sprag.service.languages import language
-from sprag.service.reading.reader import Reading
-from sprag.service.results.transient_causes import cause_phrase
+from sprag_study.engine.machine_shaft.transient_causes import ROUGH_LOAD, Ends, cause_of
+from sprag_study.engine.machine_shaft.transient_run import _FIXED_DRIVE
+from sprag_study.service.languages import language
+from sprag_study.service.reading.reader import Reading
+from sprag_study.service.results.transient_causes import cause_phrase
 
 ENDS = Ends(
     angle=1.25, drive=2.0, largest_drive=3.0, resistance=-2.5, mean_resistance=-1.5, turns_back=True, within=0.05,

@@ -9,26 +9,26 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from sprag.engine.vibration_drive.regimes import Regime
-from sprag.service.figures.curves import curves_figure, doubtful_marks
-from sprag.service.report.content import ranges
-from sprag.service.results.curve_cases import draw, draw_map, select
-from sprag.service.results.curves import CurveQuery
-from sprag.service.results.differences import differences
-from sprag.service.results.joined import joined_points
-from sprag.service.results.key_answers import answers_query, find_answers
-from sprag.service.results.regimes import left_out
-from sprag.service.results.sensitivity import sensitivity
-from sprag.service.results.tolerances.batch import Asked
-from sprag.service.results.tolerances.yields import yields
-from sprag.service.spec.document import parse_spec
-from sprag.service.storage.studies.records import CaseColumns, RowBlock
-from sprag.worker import models
-from sprag.worker.models.usable import against
-from sprag.worker.planning.goals.plan import GoalPlan
-from sprag.worker.planning.goals.robust import Table
-from sprag.worker.planning.goals.scores import judge, outputs_of
-from sprag.worker.planning.rounds import Rows
+from sprag_study.engine.vibration_drive.regimes import Regime
+from sprag_study.service.figures.curves import curves_figure, doubtful_marks
+from sprag_study.service.report.content import ranges
+from sprag_study.service.results.curve_cases import draw, draw_map, select
+from sprag_study.service.results.curves import CurveQuery
+from sprag_study.service.results.differences import differences
+from sprag_study.service.results.joined import joined_points
+from sprag_study.service.results.key_answers import answers_query, find_answers
+from sprag_study.service.results.regimes import left_out
+from sprag_study.service.results.sensitivity import sensitivity
+from sprag_study.service.results.tolerances.batch import Asked
+from sprag_study.service.results.tolerances.yields import yields
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.storage.studies.records import CaseColumns, RowBlock
+from sprag_study.worker import models
+from sprag_study.worker.models.usable import against
+from sprag_study.worker.planning.goals.plan import GoalPlan
+from sprag_study.worker.planning.goals.robust import Table
+from sprag_study.worker.planning.goals.scores import judge, outputs_of
+from sprag_study.worker.planning.rounds import Rows
 from tests.service import refined_study
 from tests.service.conftest import Service
 from tests.service.results.settled import flagged, settled

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from sprag.service.http.app import chunking, create_app
-from sprag.service.storage.store import Store
+from sprag_study.service.http.app import chunking, create_app
+from sprag_study.service.storage.store import Store
 from tests.service.conftest import InThread, Service
 from tests.worker.fakes import HandClock
 
 if TYPE_CHECKING:
     import httpx
 
-    from sprag.service.settings import Settings
+    from sprag_study.service.settings import Settings
 
 NEW_YEAR = datetime(2026, 1, 1, tzinfo=UTC)  # where the clock of the tests begins: a Thursday
 

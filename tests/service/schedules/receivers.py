@@ -18,7 +18,7 @@ from typing import Any
 
 from aiosmtpd.smtp import SMTP, AuthResult, Envelope, LoginPassword, Session
 
-from sprag.service.delivery import MailServer, Security
+from sprag_study.service.delivery import MailServer, Security
 from tests.worker.executors.certificates import require_openssl
 
 USER, PASSWORD = "sprag", "pass@word/1"

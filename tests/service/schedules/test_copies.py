@@ -10,20 +10,20 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from sprag.service.cli import doctor
-from sprag.service.cli.app import execute
-from sprag.service.cli.schedule import _show
-from sprag.service.delivery import Delivery
-from sprag.service.http.app import create_app
-from sprag.service.jobs.reports.reporter import Reporter
-from sprag.service.jobs.reports.watchdog import Watchdog, late_runs
-from sprag.service.jobs.scheduler import Scheduler
-from sprag.service.schedules.fields import read_fields
-from sprag.service.storage import deployment, maintenance
-from sprag.service.storage.database.session import Session
-from sprag.service.storage.moving import move
-from sprag.service.storage.people.audit import AuditFilter
-from sprag.service.storage.store import Store
+from sprag_study.service.cli import doctor
+from sprag_study.service.cli.app import execute
+from sprag_study.service.cli.schedule import _show
+from sprag_study.service.delivery import Delivery
+from sprag_study.service.http.app import create_app
+from sprag_study.service.jobs.reports.reporter import Reporter
+from sprag_study.service.jobs.reports.watchdog import Watchdog, late_runs
+from sprag_study.service.jobs.scheduler import Scheduler
+from sprag_study.service.schedules.fields import read_fields
+from sprag_study.service.storage import deployment, maintenance
+from sprag_study.service.storage.database.session import Session
+from sprag_study.service.storage.moving import move
+from sprag_study.service.storage.people.audit import AuditFilter
+from sprag_study.service.storage.store import Store
 from tests import postgres
 from tests.service.conftest import InThread
 from tests.service.schedules.conftest import NEW_YEAR, Clock
@@ -34,7 +34,7 @@ from tests.worker import fakes
 if TYPE_CHECKING:
     import httpx
 
-    from sprag.service.settings import Settings
+    from sprag_study.service.settings import Settings
 
 OFF = "This database is a copy, or was moved: its schedules are off"
 #: Opens a store by the clock of the test, and closes it at the end.

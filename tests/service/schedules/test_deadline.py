@@ -10,25 +10,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from sprag.service.answers import studies
-from sprag.service.jobs.scheduler import Scheduler
-from sprag.service.results.curves import Curve, Map
-from sprag.service.results.refined import Line
-from sprag.service.schedules.deadline import (
+from sprag_study.service.answers import studies
+from sprag_study.service.jobs.scheduler import Scheduler
+from sprag_study.service.results.curves import Curve, Map
+from sprag_study.service.results.refined import Line
+from sprag_study.service.schedules.deadline import (
     FinishError,
     check_run_finish,
     finish_at,
     finish_warnings,
     run_finish_at,
 )
-from sprag.service.schedules.fields import read_fields
-from sprag.service.schedules.times import Timing, Window, read_time_of_day
-from sprag.service.spec.document import parse_spec
-from sprag.worker.chunking import Chunking
-from sprag.worker.dispatcher import POLL_SECONDS, Dispatcher
-from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.models import study_results
-from sprag.worker.states import StudyState
+from sprag_study.service.schedules.fields import read_fields
+from sprag_study.service.schedules.times import Timing, Window, read_time_of_day
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.dispatcher import POLL_SECONDS, Dispatcher
+from sprag_study.worker.executors.inline import InlineExecutor
+from sprag_study.worker.models import study_results
+from sprag_study.worker.states import StudyState
 from tests.faults import refused
 from tests.service import refined_study
 from tests.service.figures.seen import chart_of
@@ -39,7 +39,7 @@ from tests.worker import fakes
 if TYPE_CHECKING:
     from conftest import Service
 
-    from sprag.worker.models import ChunkResult, ChunkTask
+    from sprag_study.worker.models import ChunkResult, ChunkTask
 
 STUDIES = "/api/v1/studies"
 NOW = datetime(2026, 3, 1, 12, tzinfo=UTC)

@@ -10,16 +10,16 @@ from datetime import UTC, datetime
 import pytest
 from pydantic import ValidationError
 
-from sprag.sentences import Amount, Clause, Sentence
-from sprag.service import languages
-from sprag.service.answers import filled
-from sprag.service.answers.schedules import RunOutcome
-from sprag.service.delivery import Delivery, DeliverySettings
-from sprag.service.jobs.reports.message import mail, sentence, webhook_body
-from sprag.service.languages import recorded
-from sprag.service.schedules.outcomes import Outcome, Result
-from sprag.service.storage.schedules.reports import Claimed
-from sprag.worker.order import Coverage
+from sprag_study.sentences import Amount, Clause, Sentence
+from sprag_study.service import languages
+from sprag_study.service.answers import filled
+from sprag_study.service.answers.schedules import RunOutcome
+from sprag_study.service.delivery import Delivery, DeliverySettings
+from sprag_study.service.jobs.reports.message import mail, sentence, webhook_body
+from sprag_study.service.languages import recorded
+from sprag_study.service.schedules.outcomes import Outcome, Result
+from sprag_study.service.storage.schedules.reports import Claimed
+from sprag_study.worker.order import Coverage
 
 NIGHT = datetime(2026, 11, 23, 1, tzinfo=UTC)
 OUTCOME = Outcome(Result.FINISHED, "st_1", "Feeder", 12_000, 12_000, 11_970, {"chatter": 3}, ended_at=NIGHT)

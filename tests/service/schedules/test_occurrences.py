@@ -12,7 +12,7 @@ from cronsim import CronSim
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sprag.service.schedules.times import Timing
+from sprag_study.service.schedules.times import Timing
 
 MINUTE, SECOND = timedelta(minutes=1), timedelta(seconds=1)
 #: A moment shortly before each change: half an hour, an hour, a day and two hours; forwards and backwards.

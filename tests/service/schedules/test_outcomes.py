@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from sprag.service import languages
-from sprag.service.jobs.scheduler import Scheduler
-from sprag.service.schedules.fields import read_fields
-from sprag.service.schedules.outcomes import Outcome, Result
-from sprag.worker.models import WINDUP_OUT_OF_DATA
+from sprag_study.service import languages
+from sprag_study.service.jobs.scheduler import Scheduler
+from sprag_study.service.schedules.fields import read_fields
+from sprag_study.service.schedules.outcomes import Outcome, Result
+from sprag_study.worker.models import WINDUP_OUT_OF_DATA
 from tests.service.conftest import made_up
 from tests.service.schedules.conftest import NEW_YEAR
 from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
-    from sprag.service.storage.store import Store
-    from sprag.worker.models import ChunkResult
-    from sprag.worker.study import Study
+    from sprag_study.service.storage.store import Store
+    from sprag_study.worker.models import ChunkResult
+    from sprag_study.worker.study import Study
     from tests.service.conftest import Service
     from tests.service.schedules.conftest import Clock
 
@@ -153,7 +153,7 @@ def test_cancelled_paused_and_refused_runs(service: Service, clock: Clock, monke
     store.studies.cancel(study)
     store.work.settle(store.work.take_over("test"), store.studies.get(study).number)
     assert last(store, schedule).result is Result.CANCELLED
-    monkeypatch.setattr("sprag.service.jobs.submission.MAX_WAITING_STUDIES", 0)
+    monkeypatch.setattr("sprag_study.service.jobs.submission.MAX_WAITING_STUDIES", 0)
     clock.set("2026-01-04T01:00")
     Scheduler(store).look()
     waiting = last(store, schedule)

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from sprag.service.http.api.schedules import EXAMPLE
-from sprag.service.jobs.scheduler import Scheduler
-from sprag.worker import models
+from sprag_study.service.http.api.schedules import EXAMPLE
+from sprag_study.service.jobs.scheduler import Scheduler
+from sprag_study.worker import models
 from tests.service.conftest import Service
 from tests.service.schedules.conftest import Clock
 from tests.service.timed_spec import SPEC

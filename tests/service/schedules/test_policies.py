@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from sprag.service.jobs.scheduler import Scheduler
-from sprag.service.schedules.deadline import FinishError
-from sprag.service.schedules.fields import ScheduleFields, change_fields, read_fields
-from sprag.service.schedules.policies import CatchUp, DueTime, Policies, check_grace, due_times
-from sprag.service.schedules.times import ALIASES, Timing, wall_clock
-from sprag.service.storage.schedules.runs import RunState
-from sprag.worker.states import StudyState
+from sprag_study.service.jobs.scheduler import Scheduler
+from sprag_study.service.schedules.deadline import FinishError
+from sprag_study.service.schedules.fields import ScheduleFields, change_fields, read_fields
+from sprag_study.service.schedules.policies import CatchUp, DueTime, Policies, check_grace, due_times
+from sprag_study.service.schedules.times import ALIASES, Timing, wall_clock
+from sprag_study.service.storage.schedules.runs import RunState
+from sprag_study.worker.states import StudyState
 from tests.service.schedules.conftest import NEW_YEAR
 from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
-    from sprag.service.storage.store import Store
+    from sprag_study.service.storage.store import Store
     from tests.service.conftest import Service
     from tests.service.schedules.conftest import Clock
 

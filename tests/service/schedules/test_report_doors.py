@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from pydantic import SecretStr, ValidationError
 
-from sprag.service.cli.configured import read_settings
-from sprag.service.cli.console import WrongInputError
-from sprag.service.delivery import is_mail_address, mail_server, origin_of
-from sprag.service.http.app import chunking, create_app
-from sprag.service.jobs.maintenance import Maintenance, MaintenancePlan
-from sprag.service.jobs.scheduler import Scheduler
-from sprag.service.settings import Settings
-from sprag.service.storage.store import Store
+from sprag_study.service.cli.configured import read_settings
+from sprag_study.service.cli.console import WrongInputError
+from sprag_study.service.delivery import is_mail_address, mail_server, origin_of
+from sprag_study.service.http.app import chunking, create_app
+from sprag_study.service.jobs.maintenance import Maintenance, MaintenancePlan
+from sprag_study.service.jobs.scheduler import Scheduler
+from sprag_study.service.settings import Settings
+from sprag_study.service.storage.store import Store
 from tests.service.conftest import InThread, Service
 from tests.service.timed_spec import SPEC
 

@@ -17,17 +17,17 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from sprag.service.delivery import Delivery, MailServer, Security
-from sprag.service.jobs.reports import channels
-from sprag.service.jobs.reports.channels import signature
-from sprag.service.jobs.reports.curve import small_curve
-from sprag.service.jobs.reports.message import mail, subject
-from sprag.service.jobs.reports.reporter import Reporter
-from sprag.service.jobs.scheduler import Scheduler
-from sprag.service.schedules.fields import read_fields
-from sprag.service.storage.people.audit import AuditFilter
-from sprag.service.storage.schedules.reports import CLAIM, Claimed, ReportRecord, ReportState
-from sprag.service.storage.store import Store
+from sprag_study.service.delivery import Delivery, MailServer, Security
+from sprag_study.service.jobs.reports import channels
+from sprag_study.service.jobs.reports.channels import signature
+from sprag_study.service.jobs.reports.curve import small_curve
+from sprag_study.service.jobs.reports.message import mail, subject
+from sprag_study.service.jobs.reports.reporter import Reporter
+from sprag_study.service.jobs.scheduler import Scheduler
+from sprag_study.service.schedules.fields import read_fields
+from sprag_study.service.storage.people.audit import AuditFilter
+from sprag_study.service.storage.schedules.reports import CLAIM, Claimed, ReportRecord, ReportState
+from sprag_study.service.storage.store import Store
 from tests.service.schedules.conftest import NEW_YEAR
 from tests.service.schedules.receivers import Hook, certificate, mail_server, webhook
 from tests.service.timed_spec import SPEC
@@ -35,7 +35,7 @@ from tests.service.timed_spec import SPEC
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from sprag.service.settings import Settings
+    from sprag_study.service.settings import Settings
     from tests.service.conftest import Service
     from tests.service.schedules.conftest import Clock
 

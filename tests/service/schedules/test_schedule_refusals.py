@@ -8,14 +8,14 @@ from typing import Any
 
 import pytest
 
-from sprag.service.jobs.scheduler import Scheduler
-from sprag.service.schedules.fields import ScheduleFields, change_fields, read_fields
-from sprag.service.settings import Settings
-from sprag.service.storage.schedules.runs import RunState
-from sprag.service.storage.store import Store
-from sprag.worker.dispatcher import Dispatcher
-from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.states import StudyState
+from sprag_study.service.jobs.scheduler import Scheduler
+from sprag_study.service.schedules.fields import ScheduleFields, change_fields, read_fields
+from sprag_study.service.settings import Settings
+from sprag_study.service.storage.schedules.runs import RunState
+from sprag_study.service.storage.store import Store
+from sprag_study.worker.dispatcher import Dispatcher
+from sprag_study.worker.executors.inline import InlineExecutor
+from sprag_study.worker.states import StudyState
 from tests.service.timed_spec import SPEC
 from tests.worker import fakes
 
@@ -75,7 +75,7 @@ def test_what_was_refused_for_a_reason_that_passes_is_tried_again(
     kept = store.schedules.create(fields(at="2026-01-01T22:00", finish_by="06:00"))
     clock.set("2026-01-01T22:00")
     with monkeypatch.context() as patch:
-        patch.setattr("sprag.service.jobs.submission.MAX_WAITING_STUDIES", 0)
+        patch.setattr("sprag_study.service.jobs.submission.MAX_WAITING_STUDIES", 0)
         for _ in range(3):
             look()
         (run,) = store.schedules.runs(kept.id)
@@ -100,7 +100,7 @@ def put_off(store: Store, clock: Clock, monkeypatch: pytest.MonkeyPatch, **given
     kept = store.schedules.create(fields(**given))
     clock.set("2026-01-01T22:00")
     with monkeypatch.context() as patch:
-        patch.setattr("sprag.service.jobs.submission.MAX_WAITING_STUDIES", 0)
+        patch.setattr("sprag_study.service.jobs.submission.MAX_WAITING_STUDIES", 0)
         Scheduler(store).look()
     return kept.id
 
@@ -181,7 +181,7 @@ def test_a_held_study_follows_the_window_of_its_schedule(store: Store, clock: Cl
 def test_a_refusal_that_does_not_pass_within_the_grace_is_final(
     store: Store, clock: Clock, monkeypatch: pytest.MonkeyPatch, given: dict[str, Any], end: str
 ) -> None:
-    monkeypatch.setattr("sprag.service.jobs.submission.MAX_WAITING_STUDIES", 0)
+    monkeypatch.setattr("sprag_study.service.jobs.submission.MAX_WAITING_STUDIES", 0)
     look = Scheduler(store).look
     kept = store.schedules.create(fields(**given))
     clock.set(given.get("at", "2026-01-01T01:00"))

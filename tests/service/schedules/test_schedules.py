@@ -12,20 +12,20 @@ from unittest.mock import Mock
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.http.app import chunking
-from sprag.service.jobs.scheduler import Scheduler
-from sprag.service.schedules.fields import ScheduleFields, read_fields
-from sprag.service.schedules.policies import DueTime
-from sprag.service.storage.errors import DatabaseBusyError, ScheduleNotFoundError
-from sprag.service.storage.schedules.runs import RunState
-from sprag.service.storage.store import Store
-from sprag.worker.states import StudyState
+from sprag_study.service.http.app import chunking
+from sprag_study.service.jobs.scheduler import Scheduler
+from sprag_study.service.schedules.fields import ScheduleFields, read_fields
+from sprag_study.service.schedules.policies import DueTime
+from sprag_study.service.storage.errors import DatabaseBusyError, ScheduleNotFoundError
+from sprag_study.service.storage.schedules.runs import RunState
+from sprag_study.service.storage.store import Store
+from sprag_study.worker.states import StudyState
 from tests.service.conftest import Service
 from tests.service.schedules.conftest import NEW_YEAR, Clock
 from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
-    from sprag.service.settings import Settings
+    from sprag_study.service.settings import Settings
 
 
 def fields(**given: Any) -> ScheduleFields:
@@ -90,7 +90,7 @@ def test_a_schedule_from_before_goes_on_as_before(
     store, look = service.store, Scheduler(service.store).look
     store.schedules.create(read_fields({"spec": old, "cron": "0 22 * * *"}, NEW_YEAR))
     with monkeypatch.context() as patch:
-        patch.setattr("sprag.service.spec.stored.accepted", lambda *_: then)
+        patch.setattr("sprag_study.service.spec.stored.accepted", lambda *_: then)
         clock.set("2026-01-01T22:00")
         look()
     clock.set("2026-01-02T22:00")
@@ -193,7 +193,7 @@ def test_a_scheduler_that_dies_as_it_submits_is_made_up_for_once(
     clock.set("2026-01-01T02:00")
     with monkeypatch.context() as patch:
         patch.setattr(
-            "sprag.service.storage.schedules.runs.inherit_figures", Mock(side_effect=DatabaseBusyError("busy"))
+            "sprag_study.service.storage.schedules.runs.inherit_figures", Mock(side_effect=DatabaseBusyError("busy"))
         )
         with pytest.raises(DatabaseBusyError):
             Scheduler(service.store).look()

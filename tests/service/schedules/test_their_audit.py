@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag.service.actor import Actor, Door, Role, act_as
-from sprag.service.jobs.maintenance import Maintenance, MaintenancePlan
-from sprag.service.jobs.scheduler import Scheduler
-from sprag.service.schedules.fields import change_fields, read_fields
-from sprag.service.storage.people.audit import AuditFilter
-from sprag.service.storage.people.people import Quota
+from sprag_study.service.actor import Actor, Door, Role, act_as
+from sprag_study.service.jobs.maintenance import Maintenance, MaintenancePlan
+from sprag_study.service.jobs.scheduler import Scheduler
+from sprag_study.service.schedules.fields import change_fields, read_fields
+from sprag_study.service.storage.people.audit import AuditFilter
+from sprag_study.service.storage.people.people import Quota
 from tests.service.schedules.conftest import NEW_YEAR
 from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
-    from sprag.service.storage.store import Store
+    from sprag_study.service.storage.store import Store
     from tests.service.conftest import Service
     from tests.service.schedules.conftest import Clock
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag.service.jobs.reports.curve import small_curve
-from sprag.service.jobs.scheduler import Scheduler
-from sprag.service.reading.quantities import TYPED
-from sprag.service.report.document import report_of
-from sprag.service.schedules.fields import read_fields
-from sprag.service.spec.saved_views import View
-from sprag.service.views.library import Library
+from sprag_study.service.jobs.reports.curve import small_curve
+from sprag_study.service.jobs.scheduler import Scheduler
+from sprag_study.service.reading.quantities import TYPED
+from sprag_study.service.report.document import report_of
+from sprag_study.service.schedules.fields import read_fields
+from sprag_study.service.spec.saved_views import View
+from sprag_study.service.views.library import Library
 from tests.service.schedules.conftest import NEW_YEAR
 from tests.service.timed_spec import SPEC
 

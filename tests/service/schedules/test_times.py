@@ -6,7 +6,7 @@ from datetime import UTC, datetime, time, timedelta
 
 import pytest
 
-from sprag.service.schedules.times import (
+from sprag_study.service.schedules.times import (
     MOST_COUNTED,
     Timing,
     TimingError,

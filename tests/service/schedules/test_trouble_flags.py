@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from sprag.service import languages
-from sprag.service.http.views import preset_of
-from sprag.service.jobs.reports.message import sentence
-from sprag.service.jobs.scheduler import Scheduler
-from sprag.service.jobs.submission import accept
-from sprag.service.schedules.fields import change_fields, read_fields
-from sprag.service.schedules.outcomes import Outcome, Result
-from sprag.service.schedules.trouble import usual_flags
-from sprag.service.spec.document import parse_spec
-from sprag.service.spec.report import SpecError
-from sprag.worker import models
+from sprag_study.service import languages
+from sprag_study.service.http.views import preset_of
+from sprag_study.service.jobs.reports.message import sentence
+from sprag_study.service.jobs.scheduler import Scheduler
+from sprag_study.service.jobs.submission import accept
+from sprag_study.service.schedules.fields import change_fields, read_fields
+from sprag_study.service.schedules.outcomes import Outcome, Result
+from sprag_study.service.schedules.trouble import usual_flags
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.report import SpecError
+from sprag_study.worker import models
 from tests.service.conftest import made_up
 from tests.service.schedule_command import Run, runner
 from tests.service.schedules.conftest import NEW_YEAR
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from sprag.worker.models import ChunkResult
-    from sprag.worker.study import Study
+    from sprag_study.worker.models import ChunkResult
+    from sprag_study.worker.study import Study
     from tests.service.conftest import Service
     from tests.service.schedules.conftest import Clock
 

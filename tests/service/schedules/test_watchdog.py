@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from sprag.service.cli import doctor
-from sprag.service.delivery import Delivery
-from sprag.service.jobs.reports.reporter import Reporter
-from sprag.service.jobs.reports.watchdog import Watchdog, late_runs
-from sprag.service.jobs.scheduler import Scheduler
-from sprag.service.schedules.fields import change_fields, read_fields
+from sprag_study.service.cli import doctor
+from sprag_study.service.delivery import Delivery
+from sprag_study.service.jobs.reports.reporter import Reporter
+from sprag_study.service.jobs.reports.watchdog import Watchdog, late_runs
+from sprag_study.service.jobs.scheduler import Scheduler
+from sprag_study.service.schedules.fields import change_fields, read_fields
 from tests.service.schedules.conftest import NEW_YEAR
 from tests.service.schedules.receivers import Hook, webhook
 from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
-    from sprag.service.storage.store import Store
+    from sprag_study.service.storage.store import Store
     from tests.service.conftest import Service
     from tests.service.schedules.conftest import Clock
 
@@ -85,7 +85,7 @@ def test_late_runs_are_shown_wherever_people_look(
     assert warning.startswith("Schedules are late: 1.")
     assert "late</b>" not in warning
     assert "sprag_schedules_late 1.0" in service.http.get("/metrics").text
-    monkeypatch.setattr("sprag.service.storage.store.SystemClock", lambda: clock)
+    monkeypatch.setattr("sprag_study.service.storage.store.SystemClock", lambda: clock)
     url = str(service.store.session.url)
     found_by_doctor = {finding.subject: finding for finding in doctor.examine(url)}["schedules"]
     assert not found_by_doctor.ok
@@ -152,7 +152,7 @@ def test_a_study_that_is_not_submitted_says_why(
 ) -> None:
     store = service.store
     kept = nightly(store)
-    monkeypatch.setattr("sprag.service.jobs.submission.MAX_WAITING_STUDIES", 0)
+    monkeypatch.setattr("sprag_study.service.jobs.submission.MAX_WAITING_STUDIES", 0)
     clock.set("2026-01-01T01:00")
     Scheduler(store).look()
     clock.set("2026-01-01T02:00")

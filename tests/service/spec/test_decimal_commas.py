@@ -8,14 +8,14 @@ from typing import Any, Final
 
 import pytest
 
-from sprag.service.cli.console import WrongInputError
-from sprag.service.cli.extend import _values
-from sprag.service.http.web.form.entries import list_of, plain
-from sprag.service.reading.numbers import parse_number, settled
-from sprag.service.reading.quantities import KINDS, read_units
-from sprag.service.reading.units import QuantityError, parse_quantity, split_quantity
-from sprag.service.spec.measured import MeasuredDataError, parse_measured
-from sprag.worker.models import model_names, parameter_catalogue
+from sprag_study.service.cli.console import WrongInputError
+from sprag_study.service.cli.extend import _values
+from sprag_study.service.http.web.form.entries import list_of, plain
+from sprag_study.service.reading.numbers import parse_number, settled
+from sprag_study.service.reading.quantities import KINDS, read_units
+from sprag_study.service.reading.units import QuantityError, parse_quantity, split_quantity
+from sprag_study.service.spec.measured import MeasuredDataError, parse_measured
+from sprag_study.worker.models import model_names, parameter_catalogue
 from tests.service.spec_sample import parsed, problems
 
 #: Cyrillic names, written down here once more.

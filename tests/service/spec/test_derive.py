@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.service.reading.units import parse_quantity
-from sprag.service.spec.document import SpecError, load_spec, parse_spec
-from sprag.service.spec.extend import parse_extended
-from sprag.service.spec.longer import longer_spec
-from sprag.worker.models import machine_shaft
-from sprag.worker.study import Study
+from sprag_study.service.reading.units import parse_quantity
+from sprag_study.service.spec.document import SpecError, load_spec, parse_spec
+from sprag_study.service.spec.extend import parse_extended
+from sprag_study.service.spec.longer import longer_spec
+from sprag_study.worker.models import machine_shaft
+from sprag_study.worker.study import Study
 from tests.service.spec_sample import changed, parsed, problems
 
 FORMULA = "1.1 * pendulums.0.mass * pendulums.0.arm^2 + 2e-4 kg*m^2"

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import pytest
 
-from sprag.service.spec.described import Field, Listed, Record, Variants, below
-from sprag.service.spec.document import SPEC, SpecError, parse_spec
-from sprag.service.spec.machine.registry import part_of
-from sprag.worker.models import model_names
+from sprag_study.service.spec.described import Field, Listed, Record, Variants, below
+from sprag_study.service.spec.document import SPEC, SpecError, parse_spec
+from sprag_study.service.spec.machine.registry import part_of
+from sprag_study.worker.models import model_names
 from tests.service.spec_sample import changed
 
 

@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sprag.service.spec.document import SpecError, format_of, load_spec, parse_spec
-from sprag.worker.limits import MAX_PROBLEMS
-from sprag.worker.study import Study
+from sprag_study.service.spec.document import SpecError, format_of, load_spec, parse_spec
+from sprag_study.worker.limits import MAX_PROBLEMS
+from sprag_study.worker.study import Study
 from tests.service.spec_sample import SPEC, changed, parsed, problems
 
 

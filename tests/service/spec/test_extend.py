@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from sprag.service.presets import preset_text
-from sprag.service.spec.document import SpecError, parse_spec
-from sprag.service.spec.extend import parse_extended
-from sprag.service.storage.part import SystemClock
-from sprag.worker.dispatcher import Dispatcher
-from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.study import Study
+from sprag_study.service.presets import preset_text
+from sprag_study.service.spec.document import SpecError, parse_spec
+from sprag_study.service.spec.extend import parse_extended
+from sprag_study.service.storage.part import SystemClock
+from sprag_study.worker.dispatcher import Dispatcher
+from sprag_study.worker.executors.inline import InlineExecutor
+from sprag_study.worker.study import Study
 from tests.service.spec_sample import parsed
 from tests.service.storage.test_reuse import Engine
 

@@ -13,15 +13,15 @@ from typing import Any, Final
 
 import pytest
 
-from sprag.sentences import Sentence
-from sprag.service.languages import catalogue, language
-from sprag.service.languages.catalogue import Key
-from sprag.service.reading.faults import allowed_text, fault_text
-from sprag.service.reading.units import parse_quantity
-from sprag.service.spec.components import read_components
-from sprag.service.spec.document import format_of, load_spec, parse_spec
-from sprag.service.spec.measured import MeasuredDataError, parse_measured
-from sprag.service.spec.report import SpecError
+from sprag_study.sentences import Sentence
+from sprag_study.service.languages import catalogue, language
+from sprag_study.service.languages.catalogue import Key
+from sprag_study.service.reading.faults import allowed_text, fault_text
+from sprag_study.service.reading.units import parse_quantity
+from sprag_study.service.spec.components import read_components
+from sprag_study.service.spec.document import format_of, load_spec, parse_spec
+from sprag_study.service.spec.measured import MeasuredDataError, parse_measured
+from sprag_study.service.spec.report import SpecError
 from tests.service.spec_sample import problems
 
 EXAMPLES: Final = Path(__file__).resolve().parents[3] / "examples"

@@ -11,14 +11,14 @@ from typing import Any, Final
 
 import pytest
 
-from sprag.engine.endings import Ending
-from sprag.engine.vibration_drive.clutch import ClutchError, check_law, fit_clutch
-from sprag.sentences import Amount, Sentence
-from sprag.service.client.errors import RefusedError
-from sprag.service.faults import Fault
-from sprag.service.languages import language
-from sprag.service.reading.faults import allowed_text, fault_text, message, value_text
-from sprag.service.reading.wording import number
+from sprag_study.engine.endings import Ending
+from sprag_study.engine.vibration_drive.clutch import ClutchError, check_law, fit_clutch
+from sprag_study.sentences import Amount, Sentence
+from sprag_study.service.client.errors import RefusedError
+from sprag_study.service.faults import Fault
+from sprag_study.service.languages import language
+from sprag_study.service.reading.faults import allowed_text, fault_text, message, value_text
+from sprag_study.service.reading.wording import number
 from tests.service.spec.machine import test_shaft as shaft
 from tests.service.spec.machine.test_shaft_parts import of_parts
 from tests.service.spec_sample import problems

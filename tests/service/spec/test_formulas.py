@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from sprag.service.spec.formulas import FormulaError, read_formula
-from sprag.worker.models.formulas import evaluate
+from sprag_study.service.spec.formulas import FormulaError, read_formula
+from sprag_study.worker.models.formulas import evaluate
 
 UNITS = {
     "mass": "kg", "arm": "m", "speed": "rad/s", "frequency": "Hz", "angle": "rad", "load": "N*m", "ratio": "1",

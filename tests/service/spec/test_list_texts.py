@@ -7,17 +7,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.service.cli.extend import _values
-from sprag.service.faults import FaultError
-from sprag.service.http.web.form.check import check_form
-from sprag.service.http.web.form.spec import spec_of, values_of
-from sprag.service.languages import language
-from sprag.service.reading.faults import allowed_text
-from sprag.service.reading.reader import Reading
-from sprag.service.spec.document import parse_spec
-from sprag.service.spec.extend import parse_extended
-from sprag.service.spec.report import SpecError
-from sprag.worker.chunking import Chunking
+from sprag_study.service.cli.extend import _values
+from sprag_study.service.faults import FaultError
+from sprag_study.service.http.web.form.check import check_form
+from sprag_study.service.http.web.form.spec import spec_of, values_of
+from sprag_study.service.languages import language
+from sprag_study.service.reading.faults import allowed_text
+from sprag_study.service.reading.reader import Reading
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.extend import parse_extended
+from sprag_study.service.spec.report import SpecError
+from sprag_study.worker.chunking import Chunking
 from tests.service.spec.test_together import LOAD, form, goal
 from tests.service.spec_sample import changed, parsed, schema
 

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from sprag.service.reading.units import parse_quantity
-from sprag.service.spec.measured import MeasuredDataError, parse_measured
+from sprag_study.service.reading.units import parse_quantity
+from sprag_study.service.spec.measured import MeasuredDataError, parse_measured
 
 
 def rows(text: str) -> list[list[float]]:

@@ -6,14 +6,14 @@ from typing import Any
 
 import pytest
 
-from sprag.service.faults import FaultError
-from sprag.service.http.web.form.columns import COLUMNS, take_columns
-from sprag.service.http.web.form.fields import Choice
-from sprag.service.http.web.form.spec import spec_of
-from sprag.service.languages import language
-from sprag.service.spec.components import read_components
-from sprag.service.spec.document import parse_spec
-from sprag.service.spec.stored import accepted
+from sprag_study.service.faults import FaultError
+from sprag_study.service.http.web.form.columns import COLUMNS, take_columns
+from sprag_study.service.http.web.form.fields import Choice
+from sprag_study.service.http.web.form.spec import spec_of
+from sprag_study.service.languages import language
+from sprag_study.service.spec.components import read_components
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.stored import accepted
 from tests.service.spec.kinds.test_calibrate import read
 from tests.service.spec.machine.test_shaft import changed as shaft_changed
 from tests.service.spec_sample import changed, parsed, problems

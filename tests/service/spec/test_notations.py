@@ -6,9 +6,9 @@ from typing import Final
 
 import pytest
 
-from sprag.service.reading.faults import message
-from sprag.service.spec.document import parse_spec
-from sprag.service.spec.report import SpecError
+from sprag_study.service.reading.faults import message
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.report import SpecError
 from tests.service.spec_sample import changed
 
 LOAD: Final = "shaft.load"

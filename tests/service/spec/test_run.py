@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from sprag.service.faults import warned
-from sprag.service.spec.run import in_periods, time_text
-from sprag.worker.limits import MAX_PROBLEMS
+from sprag_study.service.faults import warned
+from sprag_study.service.spec.run import in_periods, time_text
+from sprag_study.worker.limits import MAX_PROBLEMS
 from tests.service.spec_sample import parsed, problems
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from sprag.service.spec.document import parse_spec
-from sprag.worker import models
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.worker import models
 
 
 def _parsed(formula: str) -> Any:

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.service.spec.document import parse_spec
-from sprag.service.spec.report import SpecError
-from sprag.service.spec.stored import accepted
-from sprag.worker.axis import Axis
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.report import SpecError
+from sprag_study.service.spec.stored import accepted
+from sprag_study.worker.axis import Axis
 from tests.service.conftest import API, Service
 from tests.service.spec.machine.test_shaft import changed as press
 from tests.service.spec_sample import changed

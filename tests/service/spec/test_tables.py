@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.service.faults import Fault
-from sprag.service.http.web.form.columns import COLUMNS, take_columns
-from sprag.service.http.web.form.fields import Choice
-from sprag.service.reading.units import parse_quantity
-from sprag.service.spec.components import list_text, read_components
-from sprag.service.spec.document import parse_spec
-from sprag.service.spec.measured import MeasuredDataError, parse_measured
-from sprag.service.spec.report import SpecError
-from sprag.service.spec.stored import accepted
+from sprag_study.service.faults import Fault
+from sprag_study.service.http.web.form.columns import COLUMNS, take_columns
+from sprag_study.service.http.web.form.fields import Choice
+from sprag_study.service.reading.units import parse_quantity
+from sprag_study.service.spec.components import list_text, read_components
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.measured import MeasuredDataError, parse_measured
+from sprag_study.service.spec.report import SpecError
+from sprag_study.service.spec.stored import accepted
 from tests.service.spec.machine.test_shaft import changed
 from tests.service.spec_sample import changed as drive_changed
 from tests.service.spec_sample import parsed

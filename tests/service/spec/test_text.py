@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sprag.service.spec.document import SpecError, format_of, load_spec
-from sprag.worker.limits import MAX_BODY_BYTES, MAX_DEPTH
+from sprag_study.service.spec.document import SpecError, format_of, load_spec
+from sprag_study.worker.limits import MAX_BODY_BYTES, MAX_DEPTH
 
 plain = st.recursive(
     st.none() | st.booleans() | st.integers(-(10**20), 10**20) | st.floats(allow_nan=False, allow_infinity=False)

@@ -9,28 +9,28 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.service.cli.extend import _values
-from sprag.service.faults import FaultError
-from sprag.service.http.web.calibrate import calibration_spec
-from sprag.service.http.web.form.check import check_form
-from sprag.service.http.web.form.entries import list_of
-from sprag.service.http.web.form.machine_spec import base_of
-from sprag.service.http.web.form.spec import spec_of, values_of
-from sprag.service.languages import language
-from sprag.service.reading.faults import fault_text
-from sprag.service.reading.reader import Reading
-from sprag.service.reading.together import question, questions, with_last_unit
-from sprag.service.results.explore import ExploreQuery, plan_of
-from sprag.service.results.selection import locate_values
-from sprag.service.results.tolerances.conditions import read_conditions
-from sprag.service.spec.components import faults_of
-from sprag.service.spec.document import parse_spec
-from sprag.service.spec.extend import parse_extended
-from sprag.service.spec.stored import accepted
-from sprag.service.views.branch import range_of
-from sprag.service.views.trajectory import span
-from sprag.worker import models
-from sprag.worker.chunking import Chunking
+from sprag_study.service.cli.extend import _values
+from sprag_study.service.faults import FaultError
+from sprag_study.service.http.web.calibrate import calibration_spec
+from sprag_study.service.http.web.form.check import check_form
+from sprag_study.service.http.web.form.entries import list_of
+from sprag_study.service.http.web.form.machine_spec import base_of
+from sprag_study.service.http.web.form.spec import spec_of, values_of
+from sprag_study.service.languages import language
+from sprag_study.service.reading.faults import fault_text
+from sprag_study.service.reading.reader import Reading
+from sprag_study.service.reading.together import question, questions, with_last_unit
+from sprag_study.service.results.explore import ExploreQuery, plan_of
+from sprag_study.service.results.selection import locate_values
+from sprag_study.service.results.tolerances.conditions import read_conditions
+from sprag_study.service.spec.components import faults_of
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.extend import parse_extended
+from sprag_study.service.spec.stored import accepted
+from sprag_study.service.views.branch import range_of
+from sprag_study.service.views.trajectory import span
+from sprag_study.worker import models
+from sprag_study.worker.chunking import Chunking
 from tests.service.spec_sample import SPEC, changed, parsed, problems
 
 LOAD = "shaft.load"

@@ -15,25 +15,25 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from sprag.service import languages, views
-from sprag.service.cli.extend import _values
-from sprag.service.http.web.form.entries import list_of, plain
-from sprag.service.http.web.form.fields import Field, refine_fields, run_fields, search_fields
-from sprag.service.http.web.form.machine import entries
-from sprag.service.http.web.form.page import empty
-from sprag.service.http.web.form.spec import spec_of
-from sprag.service.languages import language
-from sprag.service.presets import preset_names, preset_text
-from sprag.service.reading import units
-from sprag.service.reading.numbers import in_language, parse_number
-from sprag.service.reading.quantities import KINDS
-from sprag.service.reading.reader import Reading
-from sprag.service.reading.units import QuantityError, measure, parse_quantity, split_quantity
-from sprag.service.reading.wording import number, typed_text, unit_text
-from sprag.service.spec.components import KINDS as COMPONENT_KINDS
-from sprag.service.spec.components import faults_of, fields_of
-from sprag.service.spec.document import format_of, load_spec
-from sprag.worker import models
+from sprag_study.service import languages, views
+from sprag_study.service.cli.extend import _values
+from sprag_study.service.http.web.form.entries import list_of, plain
+from sprag_study.service.http.web.form.fields import Field, refine_fields, run_fields, search_fields
+from sprag_study.service.http.web.form.machine import entries
+from sprag_study.service.http.web.form.page import empty
+from sprag_study.service.http.web.form.spec import spec_of
+from sprag_study.service.languages import language
+from sprag_study.service.presets import preset_names, preset_text
+from sprag_study.service.reading import units
+from sprag_study.service.reading.numbers import in_language, parse_number
+from sprag_study.service.reading.quantities import KINDS
+from sprag_study.service.reading.reader import Reading
+from sprag_study.service.reading.units import QuantityError, measure, parse_quantity, split_quantity
+from sprag_study.service.reading.wording import number, typed_text, unit_text
+from sprag_study.service.spec.components import KINDS as COMPONENT_KINDS
+from sprag_study.service.spec.components import faults_of, fields_of
+from sprag_study.service.spec.document import format_of, load_spec
+from sprag_study.worker import models
 from tests.service.spec_sample import changed
 
 TEMPLATES: Final = Path(languages.__file__).parent.parent / "http" / "web" / "templates"
@@ -253,7 +253,7 @@ def test_what_one_door_reads_all_read() -> None:
         # In a list an ordinary blank could also separate values; pages print a narrow one.
         assert parse_quantity(_values(text.replace("1 500", "1\u202f500"))[0], "rad/s") == pytest.approx(expected)
     spec = changed({"/base/excitation/frequency": "1 500 об/хв", "/base/shaft/inertia": "2·10⁻³ кг·м2"})
-    from sprag.service.spec.document import parse_spec
+    from sprag_study.service.spec.document import parse_spec
 
     study = parse_spec(spec).study
     assert study.base["shaft.inertia"] == pytest.approx(2e-3)

@@ -7,7 +7,7 @@ from typing import Any, get_args
 
 import pytest
 
-from sprag.service.faults import WarningCode, warned
+from sprag_study.service.faults import WarningCode, warned
 from tests.service.spec_sample import parsed
 
 

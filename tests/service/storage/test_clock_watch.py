@@ -9,18 +9,18 @@ from pathlib import Path
 import httpx
 import pytest
 
-from sprag.service.cli.app import execute
-from sprag.service.cli.console import ExitCode
-from sprag.service.http.app import create_app
-from sprag.service.jobs.maintenance import Maintenance, MaintenancePlan, backups
-from sprag.service.jobs.scheduler import Scheduler
-from sprag.service.jobs.submission import accept
-from sprag.service.schedules.fields import read_fields
-from sprag.service.settings import Settings
-from sprag.service.spec.document import parse_spec
-from sprag.service.storage.clock_watch import ClockWatch
-from sprag.service.storage.errors import StudyNotFoundError
-from sprag.service.storage.store import Store
+from sprag_study.service.cli.app import execute
+from sprag_study.service.cli.console import ExitCode
+from sprag_study.service.http.app import create_app
+from sprag_study.service.jobs.maintenance import Maintenance, MaintenancePlan, backups
+from sprag_study.service.jobs.scheduler import Scheduler
+from sprag_study.service.jobs.submission import accept
+from sprag_study.service.schedules.fields import read_fields
+from sprag_study.service.settings import Settings
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.storage.clock_watch import ClockWatch
+from sprag_study.service.storage.errors import StudyNotFoundError
+from sprag_study.service.storage.store import Store
 from tests.service.conftest import InThread
 from tests.service.timed_spec import SPEC
 from tests.worker.fakes import HandClock

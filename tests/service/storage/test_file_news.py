@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from sprag.service.storage.database import file_news
-from sprag.service.storage.database.file_news import FileNews
-from sprag.service.storage.store import Store
-from sprag.worker.chunking import Chunking
+from sprag_study.service.storage.database import file_news
+from sprag_study.service.storage.database.file_news import FileNews
+from sprag_study.service.storage.store import Store
+from sprag_study.worker.chunking import Chunking
 from tests.worker import fakes
 
 
@@ -47,7 +47,7 @@ def test_a_change_while_it_waits_is_reported(store: Store, news: FileNews, monke
         waited.append(seconds)
         store.work.take_over("test")
 
-    monkeypatch.setattr("sprag.service.storage.database.file_news.time.sleep", rest)
+    monkeypatch.setattr("sprag_study.service.storage.database.file_news.time.sleep", rest)
     assert news.wait(0.5)
     assert waited == [0.5]
 
@@ -56,7 +56,7 @@ def test_changes_are_reported_so_often_and_none_is_lost(
     store: Store, news: FileNews, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = 0.0
-    monkeypatch.setattr("sprag.service.storage.database.file_news.time.monotonic", lambda: now)
+    monkeypatch.setattr("sprag_study.service.storage.database.file_news.time.monotonic", lambda: now)
     monkeypatch.setattr(file_news, "LEAST_SECONDS", 1.0)
     assert news.wait(0.0)
     store.work.take_over("test")

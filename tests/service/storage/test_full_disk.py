@@ -18,11 +18,11 @@ from tests.conftest import ROOT
 HEAD = """
 import os, sys
 from pathlib import Path
-from sprag.service.storage.errors import DatabaseFullError
-from sprag.service.storage.database.lock import DispatcherLock
-from sprag.service.storage.readiness import Readiness
-from sprag.service.storage.store import Store
-from sprag.worker.chunking import Chunking
+from sprag_study.service.storage.errors import DatabaseFullError
+from sprag_study.service.storage.database.lock import DispatcherLock
+from sprag_study.service.storage.readiness import Readiness
+from sprag_study.service.storage.store import Store
+from sprag_study.worker.chunking import Chunking
 from tests.contract.filling import finish
 from tests.worker import fakes
 

@@ -12,16 +12,16 @@ from typing import Any
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.cli.app import execute
-from sprag.service.storage import maintenance, moving
-from sprag.service.storage.database.lock import DispatcherLock
-from sprag.service.storage.database.session import Session
-from sprag.service.storage.errors import DatabaseError, SchemaError
-from sprag.service.storage.moving import Moved, TableOf, move
-from sprag.service.storage.people.scopes import TokenScope
-from sprag.service.storage.store import Store
-from sprag.service.storage.tables import all_tables
-from sprag.worker.states import ChunkState
+from sprag_study.service.cli.app import execute
+from sprag_study.service.storage import maintenance, moving
+from sprag_study.service.storage.database.lock import DispatcherLock
+from sprag_study.service.storage.database.session import Session
+from sprag_study.service.storage.errors import DatabaseError, SchemaError
+from sprag_study.service.storage.moving import Moved, TableOf, move
+from sprag_study.service.storage.people.scopes import TokenScope
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.tables import all_tables
+from sprag_study.worker.states import ChunkState
 from tests.contract.filling import create, finish
 from tests.worker import fakes
 

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from sprag.service.storage.database import one_name
-from sprag.service.storage.errors import DatabaseError
-from sprag.service.storage.readiness import Readiness
-from sprag.service.storage.store import Store
+from sprag_study.service.storage.database import one_name
+from sprag_study.service.storage.errors import DatabaseError
+from sprag_study.service.storage.readiness import Readiness
+from sprag_study.service.storage.store import Store
 from tests.conftest import ROOT
 from tests.faults import refused
 from tests.worker import fakes
@@ -22,8 +22,8 @@ from tests.worker import fakes
 #: Opens a database and keeps it open until its input ends; prints why where it may not.
 HOLDER = """
 import sys
-from sprag.service.storage.errors import DatabaseError
-from sprag.service.storage.store import Store
+from sprag_study.service.storage.errors import DatabaseError
+from sprag_study.service.storage.store import Store
 try:
     with Store.open(f"sqlite:///{sys.argv[1]}"):
         print("open", flush=True)

@@ -20,24 +20,24 @@ import psycopg
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.http.app import chunking, create_app
-from sprag.service.jobs import dispatching
-from sprag.service.jobs.dispatching import WorkerSettings, run_dispatcher
-from sprag.service.settings import Settings
-from sprag.service.spec.labels import StudyChange
-from sprag.service.storage.database import postgres as storage
-from sprag.service.storage.database import session as session_module
-from sprag.service.storage.database.server_lock import ServerLock
-from sprag.service.storage.database.session import Session
-from sprag.service.storage.errors import DatabaseBusyError, DatabaseError, SchemaError, StudyNotFoundError
-from sprag.service.storage.part import lock_row
-from sprag.service.storage.people.scopes import TokenScope
-from sprag.service.storage.store import Store
-from sprag.service.storage.tables import HEAD_REVISION, STUDIES, all_tables
-from sprag.worker import models
-from sprag.worker.chunking import Chunking
-from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.states import StudyState
+from sprag_study.service.http.app import chunking, create_app
+from sprag_study.service.jobs import dispatching
+from sprag_study.service.jobs.dispatching import WorkerSettings, run_dispatcher
+from sprag_study.service.settings import Settings
+from sprag_study.service.spec.labels import StudyChange
+from sprag_study.service.storage.database import postgres as storage
+from sprag_study.service.storage.database import session as session_module
+from sprag_study.service.storage.database.server_lock import ServerLock
+from sprag_study.service.storage.database.session import Session
+from sprag_study.service.storage.errors import DatabaseBusyError, DatabaseError, SchemaError, StudyNotFoundError
+from sprag_study.service.storage.part import lock_row
+from sprag_study.service.storage.people.scopes import TokenScope
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.tables import HEAD_REVISION, STUDIES, all_tables
+from sprag_study.worker import models
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.executors.inline import InlineExecutor
+from sprag_study.worker.states import StudyState
 from tests import postgres
 from tests.conftest import ROOT, Finished
 from tests.faults import refused
@@ -90,8 +90,8 @@ def test_other_machines_are_spoken_to_in_secret(url: str, mode: str | None) -> N
 
 
 def test_without_the_driver_the_command_that_brings_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delitem(sys.modules, "sprag.service.storage.database.postgres")
-    monkeypatch.delattr("sprag.service.storage.database.postgres")
+    monkeypatch.delitem(sys.modules, "sprag_study.service.storage.database.postgres")
+    monkeypatch.delattr("sprag_study.service.storage.database.postgres")
     monkeypatch.setitem(sys.modules, "psycopg", None)
     with refused(DatabaseError, "missing-extra"):
         Session("postgresql://localhost/sprag")
@@ -343,7 +343,7 @@ def test_commands_about_the_database(
 
 
 def worker(url: str) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "sprag.service.cli", "worker", "--db", url, "--processes", "1"]
+    command = [sys.executable, "-m", "sprag_study.service.cli", "worker", "--db", url, "--processes", "1"]
     return subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True)
 
 
@@ -390,7 +390,7 @@ def test_workers_share_studies_and_take_over_those_of_one_that_is_killed_or_lose
 #: Takes the dispatcher's lock, begins to write, and stands still.
 STOPPED = """
 import os, signal, sys
-from sprag.service.storage.database.session import Session
+from sprag_study.service.storage.database.session import Session
 session = Session(sys.argv[1])
 with session.write() as connection:
     print("ready", flush=True)

@@ -15,17 +15,17 @@ import psutil
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.http.app import create_app
-from sprag.service.jobs import dispatching
-from sprag.service.jobs.dispatching import WorkerSettings, require_file, run_dispatcher
-from sprag.service.settings import Settings
-from sprag.service.storage.database.lock import DispatcherLock
-from sprag.service.storage.database.sqlite_files import sqlite_driver
-from sprag.service.storage.errors import DatabaseError, DatabaseFullError
-from sprag.service.storage.readiness import Readiness
-from sprag.service.storage.store import Store
-from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.pool.process_table import start_time
+from sprag_study.service.http.app import create_app
+from sprag_study.service.jobs import dispatching
+from sprag_study.service.jobs.dispatching import WorkerSettings, require_file, run_dispatcher
+from sprag_study.service.settings import Settings
+from sprag_study.service.storage.database.lock import DispatcherLock
+from sprag_study.service.storage.database.sqlite_files import sqlite_driver
+from sprag_study.service.storage.errors import DatabaseError, DatabaseFullError
+from sprag_study.service.storage.readiness import Readiness
+from sprag_study.service.storage.store import Store
+from sprag_study.worker.executors.inline import InlineExecutor
+from sprag_study.worker.pool.process_table import start_time
 from tests.conftest import ROOT
 from tests.faults import refused
 from tests.service.conftest import SPEC, InThread
@@ -35,8 +35,8 @@ from tests.worker import fakes
 STOPPED = """
 import os, signal, sys
 from pathlib import Path
-from sprag.service.storage.database.lock import DispatcherLock
-from sprag.service.storage.database.session import Session
+from sprag_study.service.storage.database.lock import DispatcherLock
+from sprag_study.service.storage.database.session import Session
 session = Session(f"sqlite:///{sys.argv[1]}")
 lock = DispatcherLock(Path(sys.argv[1]))
 assert lock.take()

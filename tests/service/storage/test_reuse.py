@@ -10,20 +10,20 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
-from sprag.sentences import WarningText
-from sprag.service.exports.source import stored
-from sprag.service.storage.part import SystemClock
-from sprag.service.storage.rows.origins import CasesOf
-from sprag.service.storage.store import Store
-from sprag.service.storage.studies.records import StudyRecord
-from sprag.service.storage.tables import CHUNKS
-from sprag.worker import fingerprint, models
-from sprag.worker.chunking import Chunking
-from sprag.worker.dispatcher import Dispatcher
-from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.models import ChunkResult, ChunkTask
-from sprag.worker.ports import Chunk, Finished
-from sprag.worker.study import Axis, Study
+from sprag_study.sentences import WarningText
+from sprag_study.service.exports.source import stored
+from sprag_study.service.storage.part import SystemClock
+from sprag_study.service.storage.rows.origins import CasesOf
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.studies.records import StudyRecord
+from sprag_study.service.storage.tables import CHUNKS
+from sprag_study.worker import fingerprint, models
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.dispatcher import Dispatcher
+from sprag_study.worker.executors.inline import InlineExecutor
+from sprag_study.worker.models import ChunkResult, ChunkTask
+from sprag_study.worker.ports import Chunk, Finished
+from sprag_study.worker.study import Axis, Study
 from tests.worker.fakes import BASE, RUN
 
 if TYPE_CHECKING:

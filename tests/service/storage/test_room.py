@@ -9,11 +9,11 @@ from collections.abc import Callable, Iterator
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.storage.errors import DatabaseFullError
-from sprag.service.storage.store import Store
-from sprag.service.storage.work.room import RESERVE_BYTES
-from sprag.worker.chunking import Chunking
-from sprag.worker.ports import StoreFullError
+from sprag_study.service.storage.errors import DatabaseFullError
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.work.room import RESERVE_BYTES
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.ports import StoreFullError
 from tests.contract.filling import finish
 from tests.faults import refused
 from tests.worker import fakes

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.storage.database import session as session_module
-from sprag.service.storage.database import sqlite_files
-from sprag.service.storage.database.lock import DispatcherLock
-from sprag.service.storage.database.session import Session
-from sprag.service.storage.database.sqlite_files import file_system_of, sqlite_warning
-from sprag.service.storage.errors import DatabaseBusyError, DatabaseError
-from sprag.service.storage.store import Store
-from sprag.service.storage.studies.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
-from sprag.service.storage.tables import STUDIES
+from sprag_study.service.storage.database import session as session_module
+from sprag_study.service.storage.database import sqlite_files
+from sprag_study.service.storage.database.lock import DispatcherLock
+from sprag_study.service.storage.database.session import Session
+from sprag_study.service.storage.database.sqlite_files import file_system_of, sqlite_warning
+from sprag_study.service.storage.errors import DatabaseBusyError, DatabaseError
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.studies.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
+from sprag_study.service.storage.tables import STUDIES
 from tests.faults import refused
 from tests.worker import fakes
 
@@ -30,7 +30,7 @@ def url(tmp_path: Path) -> str:
 
 
 def test_the_studies_kept_in_memory_are_few_values(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sprag.service.storage.studies.studies.KEPT_VALUES", 5)
+    monkeypatch.setattr("sprag_study.service.storage.studies.studies.KEPT_VALUES", 5)
     with Store.open(url) as store:
         made = [fakes.study(3, name=f"study {index}") for index in range(3)]
         ids = [store.studies.create({}, study).id for study in made]

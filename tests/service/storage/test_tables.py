@@ -10,9 +10,9 @@ from contextlib import suppress
 import pytest
 import sqlalchemy as sa
 
-from sprag.service.storage import tables
-from sprag.worker import models
-from sprag.worker.models import ResultInfo
+from sprag_study.service.storage import tables
+from sprag_study.worker import models
+from sprag_study.worker.models import ResultInfo
 
 
 def test_threads_that_ask_at_the_same_time_get_one_table(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,22 +15,22 @@ import numpy as np
 import pytest
 from distributed import Client, Future
 
-from sprag.service.jobs.dispatching import WorkerSettings, pool
-from sprag.service.jobs.workers import worker_list
-from sprag.service.storage.part import SystemClock
-from sprag.service.storage.store import Store
-from sprag.worker import fingerprint, models
-from sprag.worker.chunking import Chunking
-from sprag.worker.dispatcher import Dispatcher
-from sprag.worker.executors.dask import DaskExecutor
-from sprag.worker.executors.dask_jobs import Worker
-from sprag.worker.executors.dask_tasks import load_and_answer
-from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.executors.process_pool import SPARE_CHUNKS, ProcessPoolExecutor
-from sprag.worker.ports import Chunk, Executor, ExecutorError, Fate, KernelError, Outcome
-from sprag.worker.reports import processor
-from sprag.worker.states import StudyState
-from sprag.worker.study import Study
+from sprag_study.service.jobs.dispatching import WorkerSettings, pool
+from sprag_study.service.jobs.workers import worker_list
+from sprag_study.service.storage.part import SystemClock
+from sprag_study.service.storage.store import Store
+from sprag_study.worker import fingerprint, models
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.dispatcher import Dispatcher
+from sprag_study.worker.executors.dask import DaskExecutor
+from sprag_study.worker.executors.dask_jobs import Worker
+from sprag_study.worker.executors.dask_tasks import load_and_answer
+from sprag_study.worker.executors.inline import InlineExecutor
+from sprag_study.worker.executors.process_pool import SPARE_CHUNKS, ProcessPoolExecutor
+from sprag_study.worker.ports import Chunk, Executor, ExecutorError, Fate, KernelError, Outcome
+from sprag_study.worker.reports import processor
+from sprag_study.worker.states import StudyState
+from sprag_study.worker.study import Study
 from tests.conftest import ROOT
 from tests.worker import fakes
 from tests.worker.executors.clusters import DEADLINE, LEAVES_CONNECTIONS, Cluster, clusters
@@ -154,8 +154,8 @@ def test_a_fault_of_the_program_is_told_by_its_name(start: Callable[..., DaskExe
 def test_chunks_are_stopped_whether_they_run_or_not(
     start: Callable[..., DaskExecutor], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sprag.worker.executors.dask.STOP_SECONDS", 0.2)
-    monkeypatch.setattr("sprag.worker.executors.dask.WAITING_SECONDS", DEADLINE)
+    monkeypatch.setattr("sprag_study.worker.executors.dask.STOP_SECONDS", 0.2)
+    monkeypatch.setattr("sprag_study.worker.executors.dask.WAITING_SECONDS", DEADLINE)
     executor = start(run=fakes.faulty(hang=frozenset(range(8))), chunk_timeout=10 * DEADLINE)
     study = fakes.study(12)
     ready(executor, study)
@@ -236,7 +236,7 @@ def test_a_worker_with_another_numpy_is_refused(
     assert reason in caplog.text
     assert executor.capacity == 0
     # Another dispatcher may have workers for what waits.
-    monkeypatch.setattr("sprag.worker.executors.dask.WAITING_SECONDS", 0.0)
+    monkeypatch.setattr("sprag_study.worker.executors.dask.WAITING_SECONDS", 0.0)
     executor.submit(7, fakes.study(4), Chunk(1, 0, 4))
     assert gather(executor, 1)[7].fate is Fate.STOPPED
     assert not executor.ready(fakes.study(1))

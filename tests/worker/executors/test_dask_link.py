@@ -9,7 +9,7 @@ from threading import RLock, Thread
 
 import pytest
 
-from sprag.worker.executors.dask_link import Link
+from sprag_study.worker.executors.dask_link import Link
 
 
 @pytest.mark.parametrize("page", ["status", "health"])

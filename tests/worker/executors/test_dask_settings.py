@@ -8,10 +8,10 @@ import dask
 import pytest
 from pydantic import ValidationError
 
-from sprag.service.jobs.dispatching import WorkerSettings, pool
-from sprag.service.settings import Settings
-from sprag.worker.executors.dask_tasks import scheduler_address
-from sprag.worker.ports import ExecutorError
+from sprag_study.service.jobs.dispatching import WorkerSettings, pool
+from sprag_study.service.settings import Settings
+from sprag_study.worker.executors.dask_tasks import scheduler_address
+from sprag_study.worker.ports import ExecutorError
 
 
 def test_other_machines_need_certificates() -> None:
@@ -36,6 +36,6 @@ def test_the_setting_is_checked() -> None:
 
 
 def test_without_dask_the_command_that_brings_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "sprag.worker.executors.dask", None)
-    with pytest.raises(ExecutorError, match=r"pip install 'sprag\[cluster\]'"):
+    monkeypatch.setitem(sys.modules, "sprag_study.worker.executors.dask", None)
+    with pytest.raises(ExecutorError, match=r"pip install 'sprag-study\[cluster\]'"):
         pool(WorkerSettings("", 1, 60.0, executor="dask"))

@@ -14,13 +14,13 @@ import numpy as np
 import psutil
 import pytest
 
-from sprag.worker import models
-from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.executors.process_pool import MAX_FAILED_STARTS, SPARE_CHUNKS, ProcessPoolExecutor
-from sprag.worker.fingerprint import prepare_as
-from sprag.worker.models import KernelShape
-from sprag.worker.ports import Chunk, Executor, ExecutorError, Fate, KernelError, Outcome
-from sprag.worker.study import Study
+from sprag_study.worker import models
+from sprag_study.worker.executors.inline import InlineExecutor
+from sprag_study.worker.executors.process_pool import MAX_FAILED_STARTS, SPARE_CHUNKS, ProcessPoolExecutor
+from sprag_study.worker.fingerprint import prepare_as
+from sprag_study.worker.models import KernelShape
+from sprag_study.worker.ports import Chunk, Executor, ExecutorError, Fate, KernelError, Outcome
+from sprag_study.worker.study import Study
 from tests.worker import fakes
 
 DEADLINE = 600.0

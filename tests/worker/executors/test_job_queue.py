@@ -16,12 +16,12 @@ import numpy as np
 import pytest
 
 from benchmarks.faults.harness import free_port, kill_family
-from sprag.service.storage.part import SystemClock
-from sprag.service.storage.store import Store
-from sprag.worker.chunking import Chunking
-from sprag.worker.dispatcher import Dispatcher
-from sprag.worker.executors.dask import DaskExecutor
-from sprag.worker.states import StudyState
+from sprag_study.service.storage.part import SystemClock
+from sprag_study.service.storage.store import Store
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.dispatcher import Dispatcher
+from sprag_study.worker.executors.dask import DaskExecutor
+from sprag_study.worker.states import StudyState
 from tests.conftest import ROOT
 from tests.worker import fakes
 from tests.worker.executors.certificates import tls_environment

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from sprag.worker import fingerprint, models
-from sprag.worker.executors import known_answers
-from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.executors.process_pool import ProcessPoolExecutor
-from sprag.worker.models import KernelShape
-from sprag.worker.ports import Chunk, Fate, Outcome
+from sprag_study.worker import fingerprint, models
+from sprag_study.worker.executors import known_answers
+from sprag_study.worker.executors.inline import InlineExecutor
+from sprag_study.worker.executors.process_pool import ProcessPoolExecutor
+from sprag_study.worker.models import KernelShape
+from sprag_study.worker.ports import Chunk, Fate, Outcome
 from tests.worker import fakes
 
 

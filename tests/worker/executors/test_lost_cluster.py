@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sprag.service.storage.part import SystemClock
-from sprag.service.storage.store import Store
-from sprag.worker import models
-from sprag.worker.chunking import Chunking
-from sprag.worker.dispatcher import Dispatcher
-from sprag.worker.executors.dask import DaskExecutor
-from sprag.worker.planning.rounds import Rows
-from sprag.worker.states import StudyState
-from sprag.worker.study import Study
+from sprag_study.service.storage.part import SystemClock
+from sprag_study.service.storage.store import Store
+from sprag_study.worker import models
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.dispatcher import Dispatcher
+from sprag_study.worker.executors.dask import DaskExecutor
+from sprag_study.worker.planning.rounds import Rows
+from sprag_study.worker.states import StudyState
+from sprag_study.worker.study import Study
 from tests.worker import fakes
 from tests.worker.executors.clusters import DEADLINE, LEAVES_CONNECTIONS, clusters
 from tests.worker.planning import toy

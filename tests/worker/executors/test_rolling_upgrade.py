@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from benchmarks.faults.harness import COMMAND, PATIENCE, environment, kill_family, spec, study_of, until
-from sprag.service.jobs.workers import worker_list
-from sprag.service.storage.store import Store
-from sprag.worker import fingerprint, models
-from sprag.worker.chunking import Chunking
-from sprag.worker.states import StudyState
+from sprag_study.service.jobs.workers import worker_list
+from sprag_study.service.storage.store import Store
+from sprag_study.worker import fingerprint, models
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.states import StudyState
 from tests.conftest import ROOT
 from tests.worker.executors.clusters import LEAVES_CONNECTIONS, Cluster, clusters
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sprag.engine.endings import Ending
-from sprag.worker import models
-from sprag.worker.study import Axis, Study
+from sprag_study.engine.endings import Ending
+from sprag_study.worker import models
+from sprag_study.worker.study import Axis, Study
 from tests.worker import fakes
 
 
@@ -135,7 +135,7 @@ def test_a_trajectory_is_that_of_the_case() -> None:
 
 def test_a_kernel_counts_as_compiled_once_it_was_loaded(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(models, "cache_folder", lambda: tmp_path)
-    monkeypatch.setattr("sprag.engine.vibration_drive.simulate.warm_up", lambda *_: None)
+    monkeypatch.setattr("sprag_study.engine.vibration_drive.simulate.warm_up", lambda *_: None)
     study = fakes.study(3)
     shape = models.shape_of(study)
     assert not models.is_compiled(shape)

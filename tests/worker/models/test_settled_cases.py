@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sprag.engine.run import SettledRun
-from sprag.engine.vibration_drive.regimes import Regime
-from sprag.engine.vibration_drive.settle import settle
-from sprag.service.spec.document import parse_spec
-from sprag.worker import models
+from sprag_study.engine.run import SettledRun
+from sprag_study.engine.vibration_drive.regimes import Regime
+from sprag_study.engine.vibration_drive.settle import settle
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.worker import models
 from tests.service.spec_sample import changed
 
 
@@ -52,7 +52,7 @@ def test_a_chunk_of_a_settled_study_has_the_results_of_the_engine() -> None:
 
 
 def test_settled_and_transient_cases_do_not_share_rows() -> None:
-    from sprag.worker.reuse import kin_hash
+    from sprag_study.worker.reuse import kin_hash
 
     settled, timed = (parse_spec(changed({"/run": run})).study for run in ({"until": "settled"}, {"duration": 2}))
     longer = parse_spec(changed({"/run": {"at_most": "2000 periods"}})).study

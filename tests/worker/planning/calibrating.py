@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker.planning.calibrate import CalibratePlan, CalibratePlanner, Measured, Unknown
-from sprag.worker.planning.rounds import Rows
+from sprag_study.worker.planning.calibrate import CalibratePlan, CalibratePlanner, Measured, Unknown
+from sprag_study.worker.planning.rounds import Rows
 
 Floats = NDArray[np.float64]
 #: Parameters (cases, p) and conditions (cases, c) in, results out; NaN where a case fails.

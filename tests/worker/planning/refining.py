@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker.models.vibration_drive.settled import IRREGULAR
-from sprag.worker.planning.refine import describe, refiner
-from sprag.worker.planning.refine_plan import AdaptiveAxis, RefinePlan
-from sprag.worker.planning.rounds import Rows, Step
+from sprag_study.worker.models.vibration_drive.settled import IRREGULAR
+from sprag_study.worker.planning.refine import describe, refiner
+from sprag_study.worker.planning.refine_plan import AdaptiveAxis, RefinePlan
+from sprag_study.worker.planning.rounds import Rows, Step
 
 if TYPE_CHECKING:
-    from sprag.worker.planning.refine import Curve
+    from sprag_study.worker.planning.refine import Curve
 
 
 Floats = NDArray[np.float64]

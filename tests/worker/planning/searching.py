@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker.planning.goals import Goal, GoalPlan, GoalPlanner, Variable
-from sprag.worker.planning.rounds import Rows
+from sprag_study.worker.planning.goals import Goal, GoalPlan, GoalPlanner, Variable
+from sprag_study.worker.planning.rounds import Rows
 
 Floats = NDArray[np.float64]
 Function = Callable[[Floats], dict[str, Floats]]

@@ -9,10 +9,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
-from sprag.worker.planning import planner_of
-from sprag.worker.planning.calibrate import CalibratePlan, CalibratePlanner
-from sprag.worker.planning.calibrate.answer import Answer, answer
-from sprag.worker.planning.rounds import Rows
+from sprag_study.worker.planning import planner_of
+from sprag_study.worker.planning.calibrate import CalibratePlan, CalibratePlanner
+from sprag_study.worker.planning.calibrate.answer import Answer, answer
+from sprag_study.worker.planning.rounds import Rows
 from tests.worker.planning.calibrating import Form, calibrated, plan_of, rows_of
 
 Floats = NDArray[np.float64]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sprag.worker.planning.calibrate.answer import answer
+from sprag_study.worker.planning.calibrate.answer import answer
 from tests.worker.planning.calibrating import calibrated, plan_of
 
 Floats = NDArray[np.float64]

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from sprag.worker.planning.goals.draws import Draws, exponential, logarithm, normal_quantile, power
-from sprag.worker.planning.goals.linear import cholesky, lower_solved, norm, solved, weighted_sum
+from sprag_study.worker.planning.goals.draws import Draws, exponential, logarithm, normal_quantile, power
+from sprag_study.worker.planning.goals.linear import cholesky, lower_solved, norm, solved, weighted_sum
 
 
 def test_uniform_numbers_are_those_of_the_generator() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.worker.planning.goals import GoalPlan, GoalPlanner
+from sprag_study.worker.planning.goals import GoalPlan, GoalPlanner
 
 PLAN: dict[str, Any] = {
     "kind": "goal",

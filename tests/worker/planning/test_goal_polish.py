@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sprag.worker.planning.goals import Goal, GoalPlan, GoalPlanner, Limit, Variable, front
-from sprag.worker.planning.goals.polish import Polish
-from sprag.worker.planning.goals.scores import misses, outputs_of, signs
-from sprag.worker.planning.goals.space import Space
+from sprag_study.worker.planning.goals import Goal, GoalPlan, GoalPlanner, Limit, Variable, front
+from sprag_study.worker.planning.goals.polish import Polish
+from sprag_study.worker.planning.goals.scores import misses, outputs_of, signs
+from sprag_study.worker.planning.goals.space import Space
 from tests.worker.planning.searching import Function, joined, plan_of, rows_of, searched
 
 Floats = NDArray[np.float64]

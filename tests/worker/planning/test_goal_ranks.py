@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sprag.worker.planning.goals import Goal, GoalPlan, Limit, Variable, front
-from sprag.worker.planning.goals.hypervolume import hypervolume
-from sprag.worker.planning.goals.ranking import crowding, fronts, ranks, spread, undominated
-from sprag.worker.planning.goals.scores import Scores
-from sprag.worker.planning.rounds import Rows
+from sprag_study.worker.planning.goals import Goal, GoalPlan, Limit, Variable, front
+from sprag_study.worker.planning.goals.hypervolume import hypervolume
+from sprag_study.worker.planning.goals.ranking import crowding, fronts, ranks, spread, undominated
+from sprag_study.worker.planning.goals.scores import Scores
+from sprag_study.worker.planning.rounds import Rows
 from tests.worker.planning.searching import plan_of
 
 Floats = NDArray[np.float64]

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sprag.worker.planning.goals import Goal, GoalPlan, GoalPlanner, Limit, Variable, front
-from sprag.worker.planning.goals.robust import Table
-from sprag.worker.planning.goals.scores import judge, outputs_of
-from sprag.worker.planning.rounds import Rows
-from sprag.worker.spread import DRIVE
+from sprag_study.worker.planning.goals import Goal, GoalPlan, GoalPlanner, Limit, Variable, front
+from sprag_study.worker.planning.goals.robust import Table
+from sprag_study.worker.planning.goals.scores import judge, outputs_of
+from sprag_study.worker.planning.rounds import Rows
+from sprag_study.worker.spread import DRIVE
 from tests.worker.planning.searching import joined, searched
 
 Floats = NDArray[np.float64]

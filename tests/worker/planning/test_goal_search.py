@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sprag.worker.planning.goals import GoalPlan, GoalPlanner, Limit, Variable, front
-from sprag.worker.planning.goals.hypervolume import hypervolume
-from sprag.worker.planning.goals.record import Record
-from sprag.worker.planning.goals.scores import Scores
-from sprag.worker.planning.rounds import Rows
+from sprag_study.worker.planning.goals import GoalPlan, GoalPlanner, Limit, Variable, front
+from sprag_study.worker.planning.goals.hypervolume import hypervolume
+from sprag_study.worker.planning.goals.record import Record
+from sprag_study.worker.planning.goals.scores import Scores
+from sprag_study.worker.planning.rounds import Rows
 from tests.worker.planning.searching import joined, plan_of, rows_of, searched
 
 Floats = NDArray[np.float64]

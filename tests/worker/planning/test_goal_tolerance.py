@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sprag.worker.planning.goals import GoalPlan, GoalPlanner, Limit
-from sprag.worker.planning.goals.scores import judge
-from sprag.worker.planning.goals.tolerance import Tolerance, tolerant
-from sprag.worker.planning.rounds import Rows
+from sprag_study.worker.planning.goals import GoalPlan, GoalPlanner, Limit
+from sprag_study.worker.planning.goals.scores import judge
+from sprag_study.worker.planning.goals.tolerance import Tolerance, tolerant
+from sprag_study.worker.planning.rounds import Rows
 from tests.worker.planning.searching import plan_of
 
 EQUALITY, LEAST = Limit("c", "is", 2.0, 0.01), Limit("f", "at_least", 1.0)

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sprag.worker.planning.curves import Why
-from sprag.worker.planning.refine import CurveRefiner, describe
-from sprag.worker.planning.refine_plan import AdaptiveAxis, FixedAxis, RefinePlan
-from sprag.worker.planning.rounds import Rows
+from sprag_study.worker.planning.curves import Why
+from sprag_study.worker.planning.refine import CurveRefiner, describe
+from sprag_study.worker.planning.refine_plan import AdaptiveAxis, FixedAxis, RefinePlan
+from sprag_study.worker.planning.rounds import Rows
 from tests.worker.planning.refining import (
     LEAF,
     PLAN,

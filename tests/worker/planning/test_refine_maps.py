@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from sprag.worker.models.vibration_drive.settled import IRREGULAR
-from sprag.worker.planning.refine import MapRefiner, describe_maps, refiner
-from sprag.worker.planning.refine_plan import AdaptiveAxis, FixedAxis, RefinePlan
-from sprag.worker.planning.rounds import Rows, Step
+from sprag_study.worker.models.vibration_drive.settled import IRREGULAR
+from sprag_study.worker.planning.refine import MapRefiner, describe_maps, refiner
+from sprag_study.worker.planning.refine_plan import AdaptiveAxis, FixedAxis, RefinePlan
+from sprag_study.worker.planning.rounds import Rows, Step
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from sprag.worker.planning.refine import Map
+    from sprag_study.worker.planning.refine import Map
 
     Floats = NDArray[np.float64]
     Function = Callable[[Floats, Floats], dict[str, Floats]]

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from sprag.worker.planning.refine import CurveRefiner
-from sprag.worker.planning.refine_plan import AdaptiveAxis, FixedAxis, RefinePlan, half_widths_of
+from sprag_study.worker.planning.refine import CurveRefiner
+from sprag_study.worker.planning.refine_plan import AdaptiveAxis, FixedAxis, RefinePlan, half_widths_of
 from tests.worker.planning.refining import LOAD, PLAN
 from tests.worker.planning.test_refine import MANY
 

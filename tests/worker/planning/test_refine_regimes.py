@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sprag.worker.models.vibration_drive.settled import IRREGULAR
-from sprag.worker.planning.curves import Why
+from sprag_study.worker.models.vibration_drive.settled import IRREGULAR
+from sprag_study.worker.planning.curves import Why
 from tests.worker.planning.refining import (
     LEAF,
     PLAN,

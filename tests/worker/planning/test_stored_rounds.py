@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from sprag.worker.planning.refine import refiner
-from sprag.worker.planning.refine_plan import AdaptiveAxis, RefinePlan
+from sprag_study.worker.planning.refine import refiner
+from sprag_study.worker.planning.refine_plan import AdaptiveAxis, RefinePlan
 from tests.worker.planning.refining import LOAD, PLAN, refined, rows_of
 
 if TYPE_CHECKING:

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from sprag.worker import planning
-from sprag.worker.planning.rounds import Rows, Step
-from sprag.worker.study import Axis, Study
+from sprag_study.worker import planning
+from sprag_study.worker.planning.rounds import Rows, Step
+from sprag_study.worker.study import Axis, Study
 from tests.worker import fakes
 
 RESULT = "shaft.speed.mean"

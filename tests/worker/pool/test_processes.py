@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from sprag.worker.pool.child_process import ChildProcess, ProcessDiedError, _read
-from sprag.worker.pool.processes import NICENESS, interrupts_held_back
+from sprag_study.worker.pool.child_process import ChildProcess, ProcessDiedError, _read
+from sprag_study.worker.pool.processes import NICENESS, interrupts_held_back
 from tests.worker import fakes
 
 if TYPE_CHECKING:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import time
 
-from sprag.worker.executors.process_pool import ProcessPoolExecutor
-from sprag.worker.models import ChunkResult, ChunkTask
-from sprag.worker.ports import Chunk, Fate, Outcome
+from sprag_study.worker.executors.process_pool import ProcessPoolExecutor
+from sprag_study.worker.models import ChunkResult, ChunkTask
+from sprag_study.worker.ports import Chunk, Fate, Outcome
 from tests.worker import fakes
 
 

@@ -1,12 +1,12 @@
 """The model of machine shafts: a drive turns a shaft steadily against mechanisms and their resistance."""
 
-from sprag.engine.formulas.expressions import ExpressionError
-from sprag.engine.machine_shaft.problems import RelationError
-from sprag.engine.machine_shaft.sketch import Sketch
-from sprag.engine.machine_shaft.spec import LINKED, MAX_CONSTANTS, MAX_PARTS, MAX_STAGES, MAX_STEPS, REVOLUTIONS
-from sprag.engine.machine_shaft.tables import MAX_ROWS
-from sprag.engine.problems import MachineError
-from sprag.worker.models.machine_shaft.model import (
+from sprag_study.engine.formulas.expressions import ExpressionError
+from sprag_study.engine.machine_shaft.problems import RelationError
+from sprag_study.engine.machine_shaft.sketch import Sketch
+from sprag_study.engine.machine_shaft.spec import LINKED, MAX_CONSTANTS, MAX_PARTS, MAX_STAGES, MAX_STEPS, REVOLUTIONS
+from sprag_study.engine.machine_shaft.tables import MAX_ROWS
+from sprag_study.engine.problems import MachineError
+from sprag_study.worker.models.machine_shaft.model import (
     MODEL,
     REMARKS,
     SHAPE,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from sprag.engine.machine_shaft.spec import MAX_PARTS, MAX_STAGES, REVOLUTIONS
-from sprag.worker.models.form import Block, ComponentKind, Form, FormChoice, FormField, Hidden, Option, Rows
+from sprag_study.engine.machine_shaft.spec import MAX_PARTS, MAX_STAGES, REVOLUTIONS
+from sprag_study.worker.models.form import Block, ComponentKind, Form, FormChoice, FormField, Hidden, Option, Rows
 
 _FORMULA_HELP: Final = "of phi in rad, such as 40*sin(2*phi)^2; of an operation also of t in s, x and omega"
 _TABLE_HELP: Final = "two columns, with units in their headings"

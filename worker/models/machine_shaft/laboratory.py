@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from sprag.worker.models.laboratory import Laboratory, SliderKind
+from sprag_study.worker.models.laboratory import Laboratory, SliderKind
 
 LABORATORY: Final = Laboratory(
     note="ω² = S₁ + S₂ + S₃ + S₄: shares of the least energy, of the mean energy above it, of the drive's and of the "

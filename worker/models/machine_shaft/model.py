@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
 
-from sprag.engine import Ending
-from sprag.engine.machine_shaft.parameters import parameters as _engine_parameters
-from sprag.engine.machine_shaft.results import result_infos
-from sprag.engine.machine_shaft.spec import (
+from sprag_study.engine import Ending
+from sprag_study.engine.machine_shaft.parameters import parameters as _engine_parameters
+from sprag_study.engine.machine_shaft.results import result_infos
+from sprag_study.engine.machine_shaft.spec import (
     LINKED,
     REVOLUTIONS,
     Drive,
@@ -26,22 +26,22 @@ from sprag.engine.machine_shaft.spec import (
     PartChoice,
     Stage,
 )
-from sprag.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, case_machine, chunk_result
-from sprag.worker.models.machine_shaft.presentation import PRESENTATION, presentation_of
-from sprag.worker.models.model import Model
+from sprag_study.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, case_machine, chunk_result
+from sprag_study.worker.models.machine_shaft.presentation import PRESENTATION, presentation_of
+from sprag_study.worker.models.model import Model
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import ArrayLike, NDArray
 
-    from sprag.engine.catalogue import Parameter, ResultInfo
-    from sprag.engine.machine_shaft.sketch import Sketch
-    from sprag.engine.machine_shaft.transient_course import Course, Transient
-    from sprag.engine.outcome import Trajectory
-    from sprag.worker.models.model import Transients
-    from sprag.worker.models.presentation import Presentation
-    from sprag.worker.study import Study
+    from sprag_study.engine.catalogue import Parameter, ResultInfo
+    from sprag_study.engine.machine_shaft.sketch import Sketch
+    from sprag_study.engine.machine_shaft.transient_course import Course, Transient
+    from sprag_study.engine.outcome import Trajectory
+    from sprag_study.worker.models.model import Transients
+    from sprag_study.worker.models.presentation import Presentation
+    from sprag_study.worker.study import Study
 
 MODEL = "machine-shaft"
 STAGE_KINDS: tuple[str, ...] = get_args(Stage)
@@ -125,21 +125,21 @@ def _parameters(structure: str) -> dict[str, Parameter]:
 
 def check_structure(structure: Mapping[str, Any]) -> None:
     """Raise MachineError where the structure is not a valid machine."""
-    from sprag.engine.machine_shaft.machine import check_structure as engine_check
+    from sprag_study.engine.machine_shaft.machine import check_structure as engine_check
 
     engine_check(spec_of(structure))
 
 
 def check(structure: Mapping[str, Any], values: Mapping[str, float]) -> Ending:
     """The ending of the machine, ok or unstable; raise MachineError, with the reason, where it has no steady motion."""
-    from sprag.engine.machine_shaft.checked import check as engine_check
+    from sprag_study.engine.machine_shaft.checked import check as engine_check
 
     return engine_check(spec_of(structure), values)
 
 
 def base_results(structure: Mapping[str, Any], values: Mapping[str, float]) -> dict[str, float]:
     """Results of the machine with these numbers, by name; NaN for missing ones."""
-    from sprag.engine.machine_shaft.simulate import simulate
+    from sprag_study.engine.machine_shaft.simulate import simulate
 
     found = simulate(spec_of(structure), values, cases=1).values[0]
     return {info.name: float(value) for info, value in zip(result_infos(), found, strict=True)}
@@ -147,7 +147,7 @@ def base_results(structure: Mapping[str, Any], values: Mapping[str, float]) -> d
 
 def reachable_pressure(suction: ArrayLike, clearance: ArrayLike, exponent: ArrayLike) -> NDArray[np.float64]:
     """Largest pressure (Pa) that a compressor reaches."""
-    from sprag.engine.machine_shaft.operations import reachable_pressure as engine_pressure
+    from sprag_study.engine.machine_shaft.operations import reachable_pressure as engine_pressure
 
     return engine_pressure(*(np.asarray(part, dtype=np.float64) for part in (suction, clearance, exponent)))
 
@@ -156,7 +156,7 @@ def sketches_of(
     structure: Mapping[str, Any], values: Mapping[str, float], angles: NDArray[np.float64]
 ) -> tuple[Sketch, ...]:
     """Each mechanism at angles of the shaft (rad)."""
-    from sprag.engine.machine_shaft.sketches import sketches
+    from sprag_study.engine.machine_shaft.sketches import sketches
 
     return sketches(spec_of(structure), values, angles)
 
@@ -208,7 +208,7 @@ class MachineShaft(Model):
         return SHAPE
 
     def run(self, task: ChunkTask) -> ChunkResult:
-        from sprag.engine.machine_shaft.simulate import simulate
+        from sprag_study.engine.machine_shaft.simulate import simulate
 
         batch = simulate(spec_of(task.structure), task.columns, cases=task.count)
         return chunk_result(task.first, batch.endings, [""] * task.count, batch.values)
@@ -220,7 +220,7 @@ class MachineShaft(Model):
 
     def trajectory(self, study: Study, case: int, start: float, end: float, points: int) -> Trajectory:
         """Tables over ``points`` equally spaced angles of the shaft from ``start`` to ``end`` (rad)."""
-        from sprag.engine.machine_shaft.trajectory import trajectory
+        from sprag_study.engine.machine_shaft.trajectory import trajectory
 
         columns = case_machine(study, case)
         return trajectory(spec_of(study.structure), columns, np.linspace(start, end, points))
@@ -230,7 +230,7 @@ class MachineShaft(Model):
         return _Transients()
 
     def estimate_seconds_per_case(self, study: Study) -> float:
-        from sprag.engine.machine_shaft.estimate import estimate_seconds
+        from sprag_study.engine.machine_shaft.estimate import estimate_seconds
 
         return estimate_seconds(spec_of(study.structure))
 
@@ -239,7 +239,7 @@ class MachineShaft(Model):
         return 10.0
 
     def prepare(self) -> None:
-        import sprag.engine.machine_shaft.simulate  # noqa: F401
+        import sprag_study.engine.machine_shaft.simulate  # noqa: F401
 
     def load(self, shape: KernelShape) -> None:
         if shape.key:
@@ -259,15 +259,15 @@ class _Transients:
         return KernelShape(study.model, ("transient",))
 
     def run(self, study: Study, case: int, course: Course, points: int) -> Transient:
-        from sprag.engine.machine_shaft.transients import transient
+        from sprag_study.engine.machine_shaft.transients import transient
 
         return transient(spec_of(study.structure), case_machine(study, case), course, points)
 
 
 def _run_each_kind() -> bytes:
     """Run a case of each kind, which compiles what all machines share; returns their results."""
-    from sprag.engine.machine_shaft.simulate import simulate
-    from sprag.engine.machine_shaft.trajectory import trajectory
+    from sprag_study.engine.machine_shaft.simulate import simulate
+    from sprag_study.engine.machine_shaft.trajectory import trajectory
 
     found = []
     for mean, balance in product(("midrange", "angle", "time"), ("scale", "motor")):
@@ -289,8 +289,8 @@ def _run_each_kind() -> bytes:
 
 def _run_a_transient() -> bytes:
     """Run a short transient, which compiles what all of them share; returns its motion."""
-    from sprag.engine.machine_shaft.transient_course import Course
-    from sprag.engine.machine_shaft.transients import transient
+    from sprag_study.engine.machine_shaft.transient_course import Course
+    from sprag_study.engine.machine_shaft.transients import transient
 
     numbers = {"drive.inertia": 1.0, "drive.motor.no_load_speed": 10.0, "drive.motor.stall_torque": 20.0}
     spec = MachineSpec(balance="motor", drive=Drive(motor="linear"))

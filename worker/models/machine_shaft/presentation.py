@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.worker.models.machine_shaft.form import FORM
-from sprag.worker.models.machine_shaft.laboratory import LABORATORY
-from sprag.worker.models.machine_shaft.words import CAPTIONS, LETTERS
-from sprag.worker.models.presentation import Answer, Clauses, Panel, Presentation, Reference
+from sprag_study.worker.models.machine_shaft.form import FORM
+from sprag_study.worker.models.machine_shaft.laboratory import LABORATORY
+from sprag_study.worker.models.machine_shaft.words import CAPTIONS, LETTERS
+from sprag_study.worker.models.presentation import Answer, Clauses, Panel, Presentation, Reference
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from typing import Any
 
-    from sprag.engine.outcome import Trajectory
+    from sprag_study.engine.outcome import Trajectory
 
 _ENERGY: Final = "T, kinetic energy"
 _SQUARES: Final = "S₁ … S₄"

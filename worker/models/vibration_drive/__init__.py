@@ -1,6 +1,6 @@
 """The model of vibration drives: pendulums on a vibrating base that turn a shaft through freewheels."""
 
-from sprag.worker.models.vibration_drive.model import (
+from sprag_study.worker.models.vibration_drive.model import (
     MODEL,
     NOT_SETTLED,
     WINDUP_OUT_OF_DATA,

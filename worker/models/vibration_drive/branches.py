@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.engine.vibration_drive.cases import pendulum_count
-from sprag.engine.vibration_drive.results import orbit_infos
-from sprag.worker.models.branches import Along, BranchContact, CaseBranch, SpecialPoint
-from sprag.worker.models.common import case_machine
-from sprag.worker.models.parameters import allowed_values, machines_along
-from sprag.worker.models.vibration_drive.settled import settings_of, settled_study
-from sprag.worker.models.vibration_drive.swept import start_of
+from sprag_study.engine.vibration_drive.cases import pendulum_count
+from sprag_study.engine.vibration_drive.results import orbit_infos
+from sprag_study.worker.models.branches import Along, BranchContact, CaseBranch, SpecialPoint
+from sprag_study.worker.models.common import case_machine
+from sprag_study.worker.models.parameters import allowed_values, machines_along
+from sprag_study.worker.models.vibration_drive.settled import settings_of, settled_study
+from sprag_study.worker.models.vibration_drive.swept import start_of
 
 if TYPE_CHECKING:
-    from sprag.engine.continuation.problem import Special
-    from sprag.worker.study import Study
+    from sprag_study.engine.continuation.problem import Special
+    from sprag_study.worker.study import Study
 
 
 def branch_results(study: Study) -> tuple[str, ...]:
@@ -26,8 +26,8 @@ def branch_results(study: Study) -> tuple[str, ...]:
 
 def branch_of(study: Study, case: int, along: Along) -> CaseBranch:
     """The branch through the settled motion of a case; a study of runs of a given time is settled for it."""
-    from sprag.engine.continuation.follow import Range
-    from sprag.engine.vibration_drive.branches import NoOrbitError, branch
+    from sprag_study.engine.continuation.follow import Range
+    from sprag_study.engine.vibration_drive.branches import NoOrbitError, branch
 
     own = case_machine(study, case)
     value = own[along.paths[0]]

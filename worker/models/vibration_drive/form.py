@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from sprag.engine.vibration_drive.parameters import MAX_COEFFICIENTS, MAX_PENDULUMS
-from sprag.worker.models.form import Block, ComponentKind, Form, FormChoice, FormField, Option, Rows
+from sprag_study.engine.vibration_drive.parameters import MAX_COEFFICIENTS, MAX_PENDULUMS
+from sprag_study.worker.models.form import Block, ComponentKind, Form, FormChoice, FormField, Option, Rows
 
 _CLUTCH: Final = FormChoice(
     "clutch/kind", "How the clutch is given", control="switch",

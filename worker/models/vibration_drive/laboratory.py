@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from sprag.worker.models.laboratory import Laboratory, SliderKind
+from sprag_study.worker.models.laboratory import Laboratory, SliderKind
 
 LABORATORY: Final = Laboratory(
     sliders=(

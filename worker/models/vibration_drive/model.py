@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 import numpy as np
 
-from sprag.engine import Ending, Run, Span
-from sprag.engine.catalogue import ResultInfo
-from sprag.engine.vibration_drive.clutch import ClutchLawError, check_law
-from sprag.engine.vibration_drive.parameters import (
+from sprag_study.engine import Ending, Run, Span
+from sprag_study.engine.catalogue import ResultInfo
+from sprag_study.engine.vibration_drive.clutch import ClutchLawError, check_law
+from sprag_study.engine.vibration_drive.parameters import (
     CLUTCH_COEFFICIENT,
     CLUTCH_WINDUP_LIMIT,
     MAX_PENDULUMS,
     PARAMETERS,
 )
-from sprag.engine.vibration_drive.regimes import Regime, depends_on_history, settled_infos
-from sprag.engine.vibration_drive.results import result_infos
-from sprag.engine.vibration_drive.start_results import NUMBER, started_infos
-from sprag.worker.models.common import (
+from sprag_study.engine.vibration_drive.regimes import Regime, depends_on_history, settled_infos
+from sprag_study.engine.vibration_drive.results import result_infos
+from sprag_study.engine.vibration_drive.start_results import NUMBER, started_infos
+from sprag_study.worker.models.common import (
     ChunkResult,
     ChunkTask,
     Extent,
@@ -30,12 +30,12 @@ from sprag.worker.models.common import (
     case_machine,
     chunk_result,
 )
-from sprag.worker.models.model import Model
-from sprag.worker.models.starts import count_of, further_starts, has_starts
-from sprag.worker.models.vibration_drive.branches import branch_of, branch_results
-from sprag.worker.models.vibration_drive.presentation import PRESENTATION
-from sprag.worker.models.vibration_drive.sections import sections_of
-from sprag.worker.models.vibration_drive.settled import (
+from sprag_study.worker.models.model import Model
+from sprag_study.worker.models.starts import count_of, further_starts, has_starts
+from sprag_study.worker.models.vibration_drive.branches import branch_of, branch_results
+from sprag_study.worker.models.vibration_drive.presentation import PRESENTATION
+from sprag_study.worker.models.vibration_drive.sections import sections_of
+from sprag_study.worker.models.vibration_drive.settled import (
     HISTORY_DEPENDENT,
     HISTORY_FLAGS,
     REGIME_FLAGS,
@@ -45,22 +45,22 @@ from sprag.worker.models.vibration_drive.settled import (
     mean_periods,
     settings_of,
 )
-from sprag.worker.models.vibration_drive.swept import start_of, swept
-from sprag.worker.models.vibration_drive.turns import turn_of
+from sprag_study.worker.models.vibration_drive.swept import start_of, swept
+from sprag_study.worker.models.vibration_drive.turns import turn_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from numpy.typing import NDArray
 
-    from sprag.engine.catalogue import Parameter
-    from sprag.engine.outcome import Basin, Engagements, Portrait, Trajectory
-    from sprag.engine.run import Reset, Unit
-    from sprag.worker.models.branches import Along, CaseBranch
-    from sprag.worker.models.model import Clutches, Strobes
-    from sprag.worker.models.sections import CaseSections, Sampling
-    from sprag.worker.models.turns import CaseTurn
-    from sprag.worker.study import Study
+    from sprag_study.engine.catalogue import Parameter
+    from sprag_study.engine.outcome import Basin, Engagements, Portrait, Trajectory
+    from sprag_study.engine.run import Reset, Unit
+    from sprag_study.worker.models.branches import Along, CaseBranch
+    from sprag_study.worker.models.model import Clutches, Strobes
+    from sprag_study.worker.models.sections import CaseSections, Sampling
+    from sprag_study.worker.models.turns import CaseTurn
+    from sprag_study.worker.study import Study
 
 MODEL = "vibration-drive"
 
@@ -189,8 +189,8 @@ def _frequencies(study: Study) -> NDArray[np.float64]:
 
 def kernel_source(pendulums: int, coefficients: int, tolerance: float) -> str:
     """Generated source of the kernel of that shape for this machine; nothing is compiled."""
-    from sprag.engine.vibration_drive.kernel import lane_count, order_for, source
-    from sprag.engine.vibration_drive.layout import make_layout
+    from sprag_study.engine.vibration_drive.kernel import lane_count, order_for, source
+    from sprag_study.engine.vibration_drive.layout import make_layout
 
     return source(make_layout(pendulums, coefficients, order_for(tolerance), lane_count()))
 
@@ -248,8 +248,8 @@ class VibrationDrive(Model):
         return found
 
     def run(self, task: ChunkTask) -> ChunkResult:
-        from sprag.engine.vibration_drive.settle import settle
-        from sprag.engine.vibration_drive.transients import simulate_judged
+        from sprag_study.engine.vibration_drive.settle import settle
+        from sprag_study.engine.vibration_drive.transients import simulate_judged
 
         number = _key_of(task.shape).pendulums
         if has_starts(task.run):
@@ -275,7 +275,7 @@ class VibrationDrive(Model):
 
     def trajectory(self, study: Study, case: int, start: float, end: float, points: int) -> Trajectory:
         """Instantaneous values at ``points`` equally spaced times from ``start`` to ``end`` (s)."""
-        from sprag.engine.vibration_drive.simulate import trajectory
+        from sprag_study.engine.vibration_drive.simulate import trajectory
 
         columns = case_machine(study, case)
         return trajectory(columns, run_of(study.run), np.linspace(start, end, points), start_of(study, case))
@@ -292,7 +292,7 @@ class VibrationDrive(Model):
         return count_of(study.run)
 
     def estimate_seconds_per_case(self, study: Study) -> float:
-        from sprag.engine.vibration_drive.simulate import estimate_seconds
+        from sprag_study.engine.vibration_drive.simulate import estimate_seconds
 
         period = float(np.mean(1.0 / _frequencies(study)))
         return estimate_seconds(*_key_of(self.shape_of(study)), _mean_periods(study), period)
@@ -302,15 +302,15 @@ class VibrationDrive(Model):
         return 10.7 + 0.9 * (_key_of(shape).pendulums - 1)
 
     def prepare(self) -> None:
-        import sprag.engine.vibration_drive.simulate  # noqa: F401
+        import sprag_study.engine.vibration_drive.simulate  # noqa: F401
 
     def load(self, shape: KernelShape) -> None:
-        from sprag.engine.vibration_drive.simulate import warm_up
+        from sprag_study.engine.vibration_drive.simulate import warm_up
 
         warm_up(*_key_of(shape))
 
     def known_answers(self, shape: KernelShape) -> bytes:
-        from sprag.engine.vibration_drive.simulate import simulate
+        from sprag_study.engine.vibration_drive.simulate import simulate
 
         pendulums, coefficients, tolerance = _key_of(shape)
         columns = dict(_DRIVEN)
@@ -324,7 +324,7 @@ class VibrationDrive(Model):
 class _Clutches:
     def engagements(self, study: Study, case: int) -> Engagements:
         """Those of one turn of the settled motion for a settled study, otherwise those in the window."""
-        from sprag.engine.vibration_drive.engagements import engagements, settled_engagements
+        from sprag_study.engine.vibration_drive.engagements import engagements, settled_engagements
 
         columns = case_machine(study, case)
         if is_settled(study.run):
@@ -334,7 +334,7 @@ class _Clutches:
 
 class _Strobes:
     def portrait(self, study: Study, case: int) -> Portrait:
-        from sprag.engine.vibration_drive.portrait import portrait, settled_portrait
+        from sprag_study.engine.vibration_drive.portrait import portrait, settled_portrait
 
         columns = case_machine(study, case)
         if is_settled(study.run):
@@ -356,12 +356,12 @@ class _Strobes:
     def basin(
         self, study: Study, case: int, paths: tuple[str, str], x: NDArray[np.float64], y: NDArray[np.float64]
     ) -> Basin:
-        from sprag.engine.vibration_drive.starts import basin
+        from sprag_study.engine.vibration_drive.starts import basin
 
         return basin(case_machine(study, case), settings_of(study.run), paths, x, y)
 
     def end_state(self, study: Study, case: int) -> dict[str, float] | None:
-        from sprag.engine.vibration_drive.start_states import end_state
+        from sprag_study.engine.vibration_drive.start_states import end_state
 
         settings = settings_of(study.run) if is_settled(study.run) else run_of(study.run)
         return end_state(case_machine(study, case), settings, start_of(study, case))
@@ -369,7 +369,7 @@ class _Strobes:
 
 def _run_starts(task: ChunkTask, number: int) -> ChunkResult:
     """Every regime to which the starts of the cases come."""
-    from sprag.engine.vibration_drive.starts import settle_starts
+    from sprag_study.engine.vibration_drive.starts import settle_starts
 
     found = settle_starts(task.columns, settings_of(task.run), further_starts(task.run), cases=task.count)
     infos = started_infos(number)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from sprag.worker.models.presentation import Answer, Clauses, Panel, Presentation
-from sprag.worker.models.vibration_drive.form import FORM
-from sprag.worker.models.vibration_drive.laboratory import LABORATORY
-from sprag.worker.models.vibration_drive.words import CAPTIONS, LETTERS
+from sprag_study.worker.models.presentation import Answer, Clauses, Panel, Presentation
+from sprag_study.worker.models.vibration_drive.form import FORM
+from sprag_study.worker.models.vibration_drive.laboratory import LABORATORY
+from sprag_study.worker.models.vibration_drive.words import CAPTIONS, LETTERS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -6,21 +6,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.engine.vibration_drive.regimes import Regime
-from sprag.worker.models.parameters import machines_along
-from sprag.worker.models.sections import CaseSections, Sampling
-from sprag.worker.models.vibration_drive.settled import settings_of, settled_study
-from sprag.worker.models.vibration_drive.swept import start_of
+from sprag_study.engine.vibration_drive.regimes import Regime
+from sprag_study.worker.models.parameters import machines_along
+from sprag_study.worker.models.sections import CaseSections, Sampling
+from sprag_study.worker.models.vibration_drive.settled import settings_of, settled_study
+from sprag_study.worker.models.vibration_drive.swept import start_of
 
 if TYPE_CHECKING:
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
 
 def sections_of(study: Study, case: int, asked: Sampling) -> CaseSections:
     """Strobes of one case for each value of a parameter; a study of runs of a given time is settled for it."""
-    from sprag.engine.vibration_drive.automaton import Clutch
-    from sprag.engine.vibration_drive.sections import sections
-    from sprag.engine.vibration_drive.strobes import (
+    from sprag_study.engine.vibration_drive.automaton import Clutch
+    from sprag_study.engine.vibration_drive.sections import sections
+    from sprag_study.engine.vibration_drive.strobes import (
         ANGLE,
         CLUTCH,
         PENDULUM_WIDTH,

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, cast
 
-from sprag.engine.run import SettledRun
-from sprag.engine.vibration_drive.regimes import Regime
+from sprag_study.engine.run import SettledRun
+from sprag_study.engine.vibration_drive.regimes import Regime
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from sprag.engine.run import Reset
-    from sprag.worker.study import Study
+    from sprag_study.engine.run import Reset
+    from sprag_study.worker.study import Study
 
 #: Value of "until" in `Study.run` for settled runs.
 SETTLED: Final = "settled"

@@ -2,8 +2,8 @@
 
 from typing import Final
 
-from sprag.engine.vibration_drive.automaton import Clutch
-from sprag.engine.vibration_drive.possible_starts import ImpossibleStart, impossible_starts
+from sprag_study.engine.vibration_drive.automaton import Clutch
+from sprag_study.engine.vibration_drive.possible_starts import ImpossibleStart, impossible_starts
 
 #: Begins the last part of the path of every initial value.
 _INITIAL: Final = "initial_"

@@ -6,21 +6,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sprag.worker.models.common import NO_PARAMETERS, ChunkResult, ChunkTask, chunk_result
-from sprag.worker.models.vibration_drive.settled import ARBITRARY_START, JUMPED, RESTARTED, settings_of
-from sprag.worker.sweeps import line_to
+from sprag_study.worker.models.common import NO_PARAMETERS, ChunkResult, ChunkTask, chunk_result
+from sprag_study.worker.models.vibration_drive.settled import ARBITRARY_START, JUMPED, RESTARTED, settings_of
+from sprag_study.worker.sweeps import line_to
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
 
 def swept(task: ChunkTask, flags_of: Callable[[NDArray[np.float64]], list[str]]) -> ChunkResult:
     """Run the lines of a task; ``flags_of`` gives the flags that follow from the results of each case."""
-    from sprag.engine.vibration_drive.sweep import Begun, sweep
+    from sprag_study.engine.vibration_drive.sweep import Begun, sweep
 
     assert task.lines is not None
     found = sweep(task.columns, settings_of(task.run), task.lines, task.along)
@@ -41,7 +41,7 @@ def start_of(study: Study, case: int) -> NDArray[np.float64] | None:
 
     The line is run up to this case again: it gives the same bits as the run of the study.
     """
-    from sprag.engine.vibration_drive.sweep import sweep
+    from sprag_study.engine.vibration_drive.sweep import sweep
 
     if study.sweep is None:
         return None

@@ -6,20 +6,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag.engine.vibration_drive.cases import pendulum_count
-from sprag.engine.vibration_drive.regimes import settled_infos
-from sprag.worker.models.common import case_machine
-from sprag.worker.models.turns import CaseTurn
-from sprag.worker.models.vibration_drive.settled import settings_of
-from sprag.worker.models.vibration_drive.swept import start_of
+from sprag_study.engine.vibration_drive.cases import pendulum_count
+from sprag_study.engine.vibration_drive.regimes import settled_infos
+from sprag_study.worker.models.common import case_machine
+from sprag_study.worker.models.turns import CaseTurn
+from sprag_study.worker.models.vibration_drive.settled import settings_of
+from sprag_study.worker.models.vibration_drive.swept import start_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from numpy.typing import NDArray
 
-    from sprag.engine.catalogue import ResultInfo
-    from sprag.worker.study import Study
+    from sprag_study.engine.catalogue import ResultInfo
+    from sprag_study.worker.study import Study
 
 
 def turn_of(
@@ -29,7 +29,7 @@ def turn_of(
     flags_of: Callable[[Iterable[ResultInfo], NDArray[np.float64]], list[str]],
 ) -> CaseTurn:
     """The settled motion of a case of a settled study; ``flags_of`` gives the flags of rows of results."""
-    from sprag.engine.vibration_drive.turn import settled_turn
+    from sprag_study.engine.vibration_drive.turn import settled_turn
 
     machine = case_machine(study, case)
     found = settled_turn(machine, settings_of(study.run), points, start_of(study, case))

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker.planning.calibrate.course import ENDED, leverages
-from sprag.worker.planning.calibrate.fit import quadratic
+from sprag_study.worker.planning.calibrate.course import ENDED, leverages
+from sprag_study.worker.planning.calibrate.fit import quadratic
 
 if TYPE_CHECKING:
-    from sprag.worker.planning.calibrate.course import State
-    from sprag.worker.planning.calibrate.plan import CalibratePlan
-    from sprag.worker.planning.calibrate.space import Space
+    from sprag_study.worker.planning.calibrate.course import State
+    from sprag_study.worker.planning.calibrate.plan import CalibratePlan
+    from sprag_study.worker.planning.calibrate.space import Space
 
 Floats = NDArray[np.float64]
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker.planning.calibrate.plan import CURVE
+from sprag_study.worker.planning.calibrate.plan import CURVE
 
 if TYPE_CHECKING:
-    from sprag.worker.planning.calibrate.plan import CalibratePlan
+    from sprag_study.worker.planning.calibrate.plan import CalibratePlan
 
 Floats = NDArray[np.float64]
 

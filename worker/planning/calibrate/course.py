@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Final, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker.planning.calibrate.batches import normal, solved, total
-from sprag.worker.planning.calibrate.candidates import candidates
-from sprag.worker.planning.calibrate.data import Data, first_data, scaled_data
-from sprag.worker.planning.calibrate.fit import Lanes, around, differences, fit, quadratic
-from sprag.worker.planning.calibrate.plan import CURVES, RESTARTS, SEARCHES, STARTS, TRIALS
-from sprag.worker.planning.calibrate.refits import Refits, drawn, refit
-from sprag.worker.planning.goals.draws import Draws, exponential
-from sprag.worker.planning.goals.linear import cholesky
+from sprag_study.worker.planning.calibrate.batches import normal, solved, total
+from sprag_study.worker.planning.calibrate.candidates import candidates
+from sprag_study.worker.planning.calibrate.data import Data, first_data, scaled_data
+from sprag_study.worker.planning.calibrate.fit import Lanes, around, differences, fit, quadratic
+from sprag_study.worker.planning.calibrate.plan import CURVES, RESTARTS, SEARCHES, STARTS, TRIALS
+from sprag_study.worker.planning.calibrate.refits import Refits, drawn, refit
+from sprag_study.worker.planning.goals.draws import Draws, exponential
+from sprag_study.worker.planning.goals.linear import cholesky
 
 if TYPE_CHECKING:
     from collections.abc import Generator
 
-    from sprag.worker.planning.calibrate.plan import CalibratePlan
-    from sprag.worker.planning.calibrate.space import Space
+    from sprag_study.worker.planning.calibrate.plan import CalibratePlan
+    from sprag_study.worker.planning.calibrate.space import Space
 
 Floats = NDArray[np.float64]
 T = TypeVar("T")

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker.planning.calibrate.batches import total
-from sprag.worker.planning.calibrate.losses import rho
+from sprag_study.worker.planning.calibrate.batches import total
+from sprag_study.worker.planning.calibrate.losses import rho
 
 if TYPE_CHECKING:
-    from sprag.worker.planning.calibrate.plan import CalibratePlan, Loss
+    from sprag_study.worker.planning.calibrate.plan import CalibratePlan, Loss
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker.planning.calibrate.batches import bounded_steps, normal, total
-from sprag.worker.planning.calibrate.losses import slopes
-from sprag.worker.planning.calibrate.plan import MOST_ITERATIONS
+from sprag_study.worker.planning.calibrate.batches import bounded_steps, normal, total
+from sprag_study.worker.planning.calibrate.losses import slopes
+from sprag_study.worker.planning.calibrate.plan import MOST_ITERATIONS
 
 if TYPE_CHECKING:
     from collections.abc import Generator
 
-    from sprag.worker.planning.calibrate.data import Data
+    from sprag_study.worker.planning.calibrate.data import Data
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

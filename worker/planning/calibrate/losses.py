@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker.planning.goals.draws import logarithm
+from sprag_study.worker.planning.goals.draws import logarithm
 
 if TYPE_CHECKING:
-    from sprag.worker.planning.calibrate.plan import Loss
+    from sprag_study.worker.planning.calibrate.plan import Loss
 
 Floats = NDArray[np.float64]
 

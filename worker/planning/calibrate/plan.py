@@ -11,9 +11,9 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.sentences import Sentence
-from sprag.worker.errors import WrongPlanError
-from sprag.worker.limits import MAX_PLANNED_CASES
+from sprag_study.sentences import Sentence
+from sprag_study.worker.errors import WrongPlanError
+from sprag_study.worker.limits import MAX_PLANNED_CASES
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

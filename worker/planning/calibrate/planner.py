@@ -7,24 +7,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker.planning.calibrate.answer import answer
-from sprag.worker.planning.calibrate.batches import total
-from sprag.worker.planning.calibrate.course import ENDED, Request, State, course
-from sprag.worker.planning.calibrate.data import first_data
-from sprag.worker.planning.calibrate.plan import CALIBRATE
-from sprag.worker.planning.calibrate.space import Space
-from sprag.worker.planning.calibrate.stored import to_json
-from sprag.worker.planning.rounds import Rows, Step
+from sprag_study.worker.planning.calibrate.answer import answer
+from sprag_study.worker.planning.calibrate.batches import total
+from sprag_study.worker.planning.calibrate.course import ENDED, Request, State, course
+from sprag_study.worker.planning.calibrate.data import first_data
+from sprag_study.worker.planning.calibrate.plan import CALIBRATE
+from sprag_study.worker.planning.calibrate.space import Space
+from sprag_study.worker.planning.calibrate.stored import to_json
+from sprag_study.worker.planning.rounds import Rows, Step
 
 if TYPE_CHECKING:
-    from sprag.worker.planning.calibrate.data import Data
-    from sprag.worker.planning.calibrate.plan import CalibratePlan
+    from sprag_study.worker.planning.calibrate.data import Data
+    from sprag_study.worker.planning.calibrate.plan import CalibratePlan
 
 Floats = NDArray[np.float64]
 
 
 class CalibratePlanner:
-    """Finds the parameters that explain measured values (`sprag.worker.planning.rounds.Planner`).
+    """Finds the parameters that explain measured values (`sprag_study.worker.planning.rounds.Planner`).
 
     Columns of the points are the unknown parameters, then the paths of the conditions. A round is a scan, an iteration
     of the fit, a step of all refits, or the curve.

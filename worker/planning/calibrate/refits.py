@@ -13,17 +13,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker.planning.calibrate.batches import total
-from sprag.worker.planning.calibrate.fit import damped_steps, quadratic
-from sprag.worker.planning.calibrate.losses import slopes
+from sprag_study.worker.planning.calibrate.batches import total
+from sprag_study.worker.planning.calibrate.fit import damped_steps, quadratic
+from sprag_study.worker.planning.calibrate.losses import slopes
 
 if TYPE_CHECKING:
     from collections.abc import Generator
 
-    from sprag.worker.planning.calibrate.data import Data
-    from sprag.worker.planning.calibrate.fit import Lanes
-    from sprag.worker.planning.calibrate.plan import Loss
-    from sprag.worker.planning.goals.draws import Draws
+    from sprag_study.worker.planning.calibrate.data import Data
+    from sprag_study.worker.planning.calibrate.fit import Lanes
+    from sprag_study.worker.planning.calibrate.plan import Loss
+    from sprag_study.worker.planning.goals.draws import Draws
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker.planning.goals.draws import exponential, logarithm
+from sprag_study.worker.planning.goals.draws import exponential, logarithm
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.worker.planning.calibrate.plan import Unknown
-    from sprag.worker.planning.goals.draws import Draws
+    from sprag_study.worker.planning.calibrate.plan import Unknown
+    from sprag_study.worker.planning.goals.draws import Draws
 
 Floats = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from sprag.worker.planning.calibrate.answer import Answer, Direction, NextPoint
+from sprag_study.worker.planning.calibrate.answer import Answer, Direction, NextPoint
 
 _FLAGS: Final = frozenset({"at_bounds", "failed"})
 

@@ -20,18 +20,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker.planning.goals.draws import Draws, exponential, logarithm, normal_quantile
-from sprag.worker.planning.goals.linear import cholesky, lower_solved, norm, weighted_sum
-from sprag.worker.planning.goals.plan import POPULATION
-from sprag.worker.planning.goals.ranking import ranks
-from sprag.worker.planning.goals.scores import Scores, joined
-from sprag.worker.planning.goals.space import keys
-from sprag.worker.planning.goals.tolerance import Tolerance, tolerant
+from sprag_study.worker.planning.goals.draws import Draws, exponential, logarithm, normal_quantile
+from sprag_study.worker.planning.goals.linear import cholesky, lower_solved, norm, weighted_sum
+from sprag_study.worker.planning.goals.plan import POPULATION
+from sprag_study.worker.planning.goals.ranking import ranks
+from sprag_study.worker.planning.goals.scores import Scores, joined
+from sprag_study.worker.planning.goals.space import keys
+from sprag_study.worker.planning.goals.tolerance import Tolerance, tolerant
 
 if TYPE_CHECKING:
     from collections.abc import Container
 
-    from sprag.worker.planning.goals.space import Space
+    from sprag_study.worker.planning.goals.space import Space
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

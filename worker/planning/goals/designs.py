@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker.planning.goals.ranking import ranks
-from sprag.worker.planning.goals.scores import judge, misses, outputs_of, signs
+from sprag_study.worker.planning.goals.ranking import ranks
+from sprag_study.worker.planning.goals.scores import judge, misses, outputs_of, signs
 
 if TYPE_CHECKING:
-    from sprag.worker.planning.goals.plan import GoalPlan
-    from sprag.worker.planning.rounds import Rows
+    from sprag_study.worker.planning.goals.plan import GoalPlan
+    from sprag_study.worker.planning.rounds import Rows
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker.planning.goals.draws import Draws, power
-from sprag.worker.planning.goals.ranking import ranks, spread
-from sprag.worker.planning.goals.scores import joined
-from sprag.worker.planning.goals.space import keys
-from sprag.worker.planning.goals.tolerance import Tolerance, tolerant
+from sprag_study.worker.planning.goals.draws import Draws, power
+from sprag_study.worker.planning.goals.ranking import ranks, spread
+from sprag_study.worker.planning.goals.scores import joined
+from sprag_study.worker.planning.goals.space import keys
+from sprag_study.worker.planning.goals.tolerance import Tolerance, tolerant
 
 if TYPE_CHECKING:
     from collections.abc import Container
 
-    from sprag.worker.planning.goals.scores import Scores
-    from sprag.worker.planning.goals.space import Space
+    from sprag_study.worker.planning.goals.scores import Scores
+    from sprag_study.worker.planning.goals.space import Space
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -10,8 +10,8 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker.limits import MAX_DRIVES
-from sprag.worker.spread import DRIVE
+from sprag_study.worker.limits import MAX_DRIVES
+from sprag_study.worker.spread import DRIVE
 
 #: Value of "kind" in the plan.
 GOAL: Final = "goal"

@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker.planning.goals.cma import Cma
-from sprag.worker.planning.goals.nsga2 import Nsga2
-from sprag.worker.planning.goals.polish import MOST_STARTS, MOST_TRIALS, Polish, polish_designs
-from sprag.worker.planning.goals.record import Record
-from sprag.worker.planning.goals.scores import Scores, judge, outputs_of
-from sprag.worker.planning.goals.space import Space, keys
-from sprag.worker.planning.rounds import Rows, Step
+from sprag_study.worker.planning.goals.cma import Cma
+from sprag_study.worker.planning.goals.nsga2 import Nsga2
+from sprag_study.worker.planning.goals.polish import MOST_STARTS, MOST_TRIALS, Polish, polish_designs
+from sprag_study.worker.planning.goals.record import Record
+from sprag_study.worker.planning.goals.scores import Scores, judge, outputs_of
+from sprag_study.worker.planning.goals.space import Space, keys
+from sprag_study.worker.planning.rounds import Rows, Step
 
 if TYPE_CHECKING:
     from collections.abc import Container
 
-    from sprag.worker.planning.goals.plan import GoalPlan
+    from sprag_study.worker.planning.goals.plan import GoalPlan
 
 Floats = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ class Search(Protocol):
 
 
 class GoalPlanner:
-    """Searches for the best designs (`sprag.worker.planning.rounds.Planner`).
+    """Searches for the best designs (`sprag_study.worker.planning.rounds.Planner`).
 
     One goal is searched for by CMA-ES, several or none by NSGA-II; then equalities are polished.
 

@@ -21,12 +21,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker.planning.goals.linear import norm, solved, weighted_sum
-from sprag.worker.planning.goals.scores import misses
+from sprag_study.worker.planning.goals.linear import norm, solved, weighted_sum
+from sprag_study.worker.planning.goals.scores import misses
 
 if TYPE_CHECKING:
-    from sprag.worker.planning.goals.plan import GoalPlan
-    from sprag.worker.planning.goals.space import Space
+    from sprag_study.worker.planning.goals.plan import GoalPlan
+    from sprag_study.worker.planning.goals.space import Space
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

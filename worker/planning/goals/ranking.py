@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from sprag.worker.planning.goals.scores import Scores
+    from sprag_study.worker.planning.goals.scores import Scores
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

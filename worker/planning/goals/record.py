@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker.planning.goals.hypervolume import MOST_GOALS, hypervolume
-from sprag.worker.planning.goals.plan import GOAL
-from sprag.worker.planning.goals.polish import MET
-from sprag.worker.planning.goals.ranking import undominated
-from sprag.worker.planning.goals.scores import misses, signs
+from sprag_study.worker.planning.goals.hypervolume import MOST_GOALS, hypervolume
+from sprag_study.worker.planning.goals.plan import GOAL
+from sprag_study.worker.planning.goals.polish import MET
+from sprag_study.worker.planning.goals.ranking import undominated
+from sprag_study.worker.planning.goals.scores import misses, signs
 
 if TYPE_CHECKING:
-    from sprag.worker.planning.goals.plan import GoalPlan
-    from sprag.worker.planning.goals.scores import Scores
+    from sprag_study.worker.planning.goals.plan import GoalPlan
+    from sprag_study.worker.planning.goals.scores import Scores
 
 Floats = NDArray[np.float64]
 

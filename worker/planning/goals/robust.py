@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker.models.usable import against, half_width
+from sprag_study.worker.models.usable import against, half_width
 
 if TYPE_CHECKING:
-    from sprag.worker.planning.goals.plan import Goal, GoalPlan, Limit
-    from sprag.worker.planning.rounds import Rows
+    from sprag_study.worker.planning.goals.plan import Goal, GoalPlan, Limit
+    from sprag_study.worker.planning.rounds import Rows
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

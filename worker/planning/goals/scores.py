@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag.worker.planning.goals.linear import weighted_sum
-from sprag.worker.planning.goals.robust import Table
+from sprag_study.worker.planning.goals.linear import weighted_sum
+from sprag_study.worker.planning.goals.robust import Table
 
 if TYPE_CHECKING:
-    from sprag.worker.planning.goals.plan import GoalPlan, Limit
-    from sprag.worker.planning.rounds import Rows
+    from sprag_study.worker.planning.goals.plan import GoalPlan, Limit
+    from sprag_study.worker.planning.rounds import Rows
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from sprag.worker.planning.goals.plan import GoalPlan
+    from sprag_study.worker.planning.goals.plan import GoalPlan
 
 Floats = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from sprag.worker.planning.goals.scores import Scores
+    from sprag_study.worker.planning.goals.scores import Scores
 
 #: Share of the first generation that is below the first epsilon, the generations in which epsilon falls, and the power
 #: of its fall.

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Final
 from markupsafe import Markup
 from starlette.datastructures import QueryParams
 
-from sprag.sentences import Amount, Whole
-from sprag.service.faults import FaultError, SelectionError
-from sprag.service.figures.curves import curves_figure
-from sprag.service.figures.read import read_figure
-from sprag.service.http.web.comparison.chosen import (
+from sprag_study.sentences import Amount, Whole
+from sprag_study.service.faults import FaultError, SelectionError
+from sprag_study.service.figures.curves import curves_figure
+from sprag_study.service.figures.read import read_figure
+from sprag_study.service.http.web.comparison.chosen import (
     Comparison,
     chosen_studies,
     comparison,
@@ -23,29 +23,29 @@ from sprag.service.http.web.comparison.chosen import (
     short_names,
     told_apart_by,
 )
-from sprag.service.http.web.figures.drawn import drawn as drawn_figure
-from sprag.service.http.web.view_forms import EMPTY, Fact, fact_of
-from sprag.service.languages import gettext
-from sprag.service.reading.part_names import lower_first
-from sprag.service.reading.reader import Phrase, joined, model_title, plural
-from sprag.service.results.headlines.along import curve_words
-from sprag.service.results.headlines.headline import NOTHING, short_titles
-from sprag.service.results.refined import curve_plan
-from sprag.service.views.headline import headline_of, usual_query
-from sprag.service.views.library import reading_of
-from sprag.service.views.relatives import asked_by
-from sprag.worker.directions import SWEEP
-from sprag.worker.study import SAME_VALUE
+from sprag_study.service.http.web.figures.drawn import drawn as drawn_figure
+from sprag_study.service.http.web.view_forms import EMPTY, Fact, fact_of
+from sprag_study.service.languages import gettext
+from sprag_study.service.reading.part_names import lower_first
+from sprag_study.service.reading.reader import Phrase, joined, model_title, plural
+from sprag_study.service.results.headlines.along import curve_words
+from sprag_study.service.results.headlines.headline import NOTHING, short_titles
+from sprag_study.service.results.refined import curve_plan
+from sprag_study.service.views.headline import headline_of, usual_query
+from sprag_study.service.views.library import reading_of
+from sprag_study.service.views.relatives import asked_by
+from sprag_study.worker.directions import SWEEP
+from sprag_study.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.faults import Fault
-    from sprag.service.reading.reader import Choice, Reading
-    from sprag.service.results.curves import Curve, CurveQuery, Curves
-    from sprag.service.storage.studies.records import StudyRecord
-    from sprag.service.views.headline import Headline, KeyNumber
-    from sprag.service.views.library import Library
+    from sprag_study.service.faults import Fault
+    from sprag_study.service.reading.reader import Choice, Reading
+    from sprag_study.service.results.curves import Curve, CurveQuery, Curves
+    from sprag_study.service.storage.studies.records import StudyRecord
+    from sprag_study.service.views.headline import Headline, KeyNumber
+    from sprag_study.service.views.library import Library
 
 #: Curves of a chart at most.
 MOST_DRAWN: Final = 5

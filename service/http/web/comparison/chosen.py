@@ -6,34 +6,34 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from sprag.sentences import Sentence
-from sprag.service.answers.differing import MOST_COMPARED, common_axes, unique_names
-from sprag.service.faults import SelectionError, refused
-from sprag.service.http.web.sheet.chart import results_of
-from sprag.service.languages import N_
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.limits import at_most
-from sprag.service.reading.part_names import lower_first
-from sprag.service.results.choice import held
-from sprag.service.results.curve_cases import draw, select
-from sprag.service.results.curves import CurveQuery, Curves
-from sprag.service.results.defaults import main_query
-from sprag.service.results.differences import differences
-from sprag.service.results.headlines.headline import short_captions
-from sprag.service.results.selection import value_of
-from sprag.service.views.relatives import asked_by, what_differs
-from sprag.worker import models
+from sprag_study.sentences import Sentence
+from sprag_study.service.answers.differing import MOST_COMPARED, common_axes, unique_names
+from sprag_study.service.faults import SelectionError, refused
+from sprag_study.service.http.web.sheet.chart import results_of
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.limits import at_most
+from sprag_study.service.reading.part_names import lower_first
+from sprag_study.service.results.choice import held
+from sprag_study.service.results.curve_cases import draw, select
+from sprag_study.service.results.curves import CurveQuery, Curves
+from sprag_study.service.results.defaults import main_query
+from sprag_study.service.results.differences import differences
+from sprag_study.service.results.headlines.headline import short_captions
+from sprag_study.service.results.selection import value_of
+from sprag_study.service.views.relatives import asked_by, what_differs
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from starlette.datastructures import QueryParams
 
-    from sprag.service.reading.reader import Reading
-    from sprag.service.storage.store import Store
-    from sprag.service.storage.studies.records import StudyRecord
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.study import Study
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.service.storage.store import Store
+    from sprag_study.service.storage.studies.records import StudyRecord
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.study import Study
 
 
 @dataclass(frozen=True, slots=True)

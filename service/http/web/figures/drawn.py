@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
-from sprag.service.figures.svg import DOUBLE, NARROW, WIDE, svg
-from sprag.service.figures.svg_map import map_svg
-from sprag.service.http.prefix import here
-from sprag.service.reading.reader import shown
+from sprag_study.service.figures.svg import DOUBLE, NARROW, WIDE, svg
+from sprag_study.service.figures.svg_map import map_svg
+from sprag_study.service.http.prefix import here
+from sprag_study.service.reading.reader import shown
 
 if TYPE_CHECKING:
-    from sprag.service.figures.figure import Figure
-    from sprag.service.results.curves import Map
+    from sprag_study.service.figures.figure import Figure
+    from sprag_study.service.results.curves import Map
 
 
 def cases_of(study_id: str) -> str:

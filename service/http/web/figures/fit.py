@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.service.reading.units import parse_quantity
-from sprag.service.reading.wording import number
-from sprag.worker import models
+from sprag_study.service.reading.units import parse_quantity
+from sprag_study.service.reading.wording import number
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from sprag.worker.models import ClutchFit
+    from sprag_study.worker.models import ClutchFit
 
 WIDTH: Final = 560
 _LEFT, _RIGHT, _TOP, _LAW, _GAP, _REST = 64.0, 12.0, 10.0, 190.0, 26.0, 80.0

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from sprag.service.http.web.figures.fit import FitChart, fit_chart
-from sprag.service.reading.units import QuantityError, parse_quantity
-from sprag.service.results.fits import fit_json
-from sprag.service.spec.derive import with_values
-from sprag.service.spec.document import parse_spec
-from sprag.service.spec.machine.clutch import read_clutch
-from sprag.service.spec.node import Node
-from sprag.service.spec.report import Report
-from sprag.service.spec.stored import accepted
+from sprag_study.service.http.web.figures.fit import FitChart, fit_chart
+from sprag_study.service.reading.units import QuantityError, parse_quantity
+from sprag_study.service.results.fits import fit_json
+from sprag_study.service.spec.derive import with_values
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.machine.clutch import read_clutch
+from sprag_study.service.spec.node import Node
+from sprag_study.service.spec.report import Report
+from sprag_study.service.spec.stored import accepted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from sprag.service.answers.studies import ClutchFitReport
-    from sprag.worker.models import ClutchFit
-    from sprag.worker.study import Study
+    from sprag_study.service.answers.studies import ClutchFitReport
+    from sprag_study.worker.models import ClutchFit
+    from sprag_study.worker.study import Study
 
     Fitted = tuple[ClutchFitReport, FitChart]
 

@@ -6,24 +6,24 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag.service.figures.figure import PALETTE, Line
-from sprag.service.figures.motion import motion_figure
-from sprag.service.figures.read import read_figure
-from sprag.service.figures.svg import spark, svg
-from sprag.service.figures.turn import turn_figure
-from sprag.service.json_text import numbers
-from sprag.service.languages import gettext
-from sprag.service.reading.reader import Phrase
-from sprag.worker import models
-from sprag.worker.models.abilities import case_turn
+from sprag_study.service.figures.figure import PALETTE, Line
+from sprag_study.service.figures.motion import motion_figure
+from sprag_study.service.figures.read import read_figure
+from sprag_study.service.figures.svg import spark, svg
+from sprag_study.service.figures.turn import turn_figure
+from sprag_study.service.json_text import numbers
+from sprag_study.service.languages import gettext
+from sprag_study.service.reading.reader import Phrase
+from sprag_study.worker import models
+from sprag_study.worker.models.abilities import case_turn
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.figures.figure import Figure
-    from sprag.service.reading.reader import Reading
-    from sprag.worker.models import Trajectory
-    from sprag.worker.study import Study
+    from sprag_study.service.figures.figure import Figure
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.worker.models import Trajectory
+    from sprag_study.worker.study import Study
 
 #: Samples of a motion over time and over an angle, and at most so many frames of a drawing.
 _SAMPLES, _ANGLES, _FRAMES = 600, 721, 240

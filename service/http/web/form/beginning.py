@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
 
-from sprag.service.http.views import preset_of
-from sprag.service.http.web.form.own_machine import example_spec
-from sprag.service.http.web.form.spec import values_of
-from sprag.service.presets import preset_names
+from sprag_study.service.http.views import preset_of
+from sprag_study.service.http.web.form.own_machine import example_spec
+from sprag_study.service.http.web.form.spec import values_of
+from sprag_study.service.presets import preset_names
 
 
 @lru_cache(maxsize=8)

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from sprag.service.http.web.form.entries import (
+from sprag_study.service.http.web.form.entries import (
     Faults,
     Values,
     list_of,
@@ -14,11 +14,11 @@ from sprag.service.http.web.form.entries import (
     text_of,
     unclear,
 )
-from sprag.service.http.web.form.parts import PARTS
-from sprag.service.http.web.form.rows import field_of_row, filled, items_of_part, values_of_part
-from sprag.service.languages import N_, _
-from sprag.service.spec.axes.exclude import LIMITS
-from sprag.service.spec.axes.sample import SAMPLE
+from sprag_study.service.http.web.form.parts import PARTS
+from sprag_study.service.http.web.form.rows import field_of_row, filled, items_of_part, values_of_part
+from sprag_study.service.languages import N_, _
+from sprag_study.service.spec.axes.exclude import LIMITS
+from sprag_study.service.spec.axes.sample import SAMPLE
 
 #: Field with the points, as the text of a CSV file.
 POINTS: Final = "/points"

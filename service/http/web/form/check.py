@@ -7,36 +7,36 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode
 
-from sprag.sentences import Place, WarningText
-from sprag.service.faults import Fault
-from sprag.service.figures.drawing import Drawing
-from sprag.service.figures.drawings import BETWEEN_FIELDS, drawings
-from sprag.service.http.web.figures.fits import FitChart, fit_at
-from sprag.service.http.web.form.columns import COLUMNS
-from sprag.service.http.web.form.entries import Faults, items_of, list_of, range_of
-from sprag.service.http.web.form.machine import model_name, places
-from sprag.service.http.web.form.machine_spec import step_of
-from sprag.service.http.web.form.rows import WAYS
-from sprag.service.http.web.form.spec import field_of, spec_of
-from sprag.service.jobs.preview import preview_json
-from sprag.service.languages import _, gettext, grouped, ngettext
-from sprag.service.reading.faults import message
-from sprag.service.reading.numbers import assumption, in_language, settle, settled
-from sprag.service.reading.quantities import TYPED
-from sprag.service.reading.reader import CLUTCH, Choice, Reading, reading_for
-from sprag.service.reading.units import parse_quantity
-from sprag.service.reading.wording import duration
-from sprag.service.results.draft_words import draft_words
-from sprag.service.schedules.deadline import ALLOWED, FinishError, finish_at
-from sprag.service.spec.document import ParsedSpec, SpecError, load_spec, parse_spec
-from sprag.service.spec.measured import MeasuredDataError, parse_measured
+from sprag_study.sentences import Place, WarningText
+from sprag_study.service.faults import Fault
+from sprag_study.service.figures.drawing import Drawing
+from sprag_study.service.figures.drawings import BETWEEN_FIELDS, drawings
+from sprag_study.service.http.web.figures.fits import FitChart, fit_at
+from sprag_study.service.http.web.form.columns import COLUMNS
+from sprag_study.service.http.web.form.entries import Faults, items_of, list_of, range_of
+from sprag_study.service.http.web.form.machine import model_name, places
+from sprag_study.service.http.web.form.machine_spec import step_of
+from sprag_study.service.http.web.form.rows import WAYS
+from sprag_study.service.http.web.form.spec import field_of, spec_of
+from sprag_study.service.jobs.preview import preview_json
+from sprag_study.service.languages import _, gettext, grouped, ngettext
+from sprag_study.service.reading.faults import message
+from sprag_study.service.reading.numbers import assumption, in_language, settle, settled
+from sprag_study.service.reading.quantities import TYPED
+from sprag_study.service.reading.reader import CLUTCH, Choice, Reading, reading_for
+from sprag_study.service.reading.units import parse_quantity
+from sprag_study.service.reading.wording import duration
+from sprag_study.service.results.draft_words import draft_words
+from sprag_study.service.schedules.deadline import ALLOWED, FinishError, finish_at
+from sprag_study.service.spec.document import ParsedSpec, SpecError, load_spec, parse_spec
+from sprag_study.service.spec.measured import MeasuredDataError, parse_measured
 
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from sprag.service.answers.studies import ClutchFitReport, Preview
-    from sprag.worker.chunking import Chunking
-    from sprag.worker.study import Study
+    from sprag_study.service.answers.studies import ClutchFitReport, Preview
+    from sprag_study.worker.chunking import Chunking
+    from sprag_study.worker.study import Study
 
     Known = Callable[[Study], int]
 

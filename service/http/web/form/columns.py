@@ -7,13 +7,13 @@ import re
 from collections.abc import Mapping
 from typing import Final
 
-from sprag.service.http.web.form.entries import Faults, Values
-from sprag.service.http.web.form.fields import Groups
-from sprag.service.http.web.form.parts import PARTS, count_of, drop
-from sprag.service.languages import ENGLISH, current, gettext
-from sprag.service.reading.numbers import WITHOUT_DOUBT, is_ambiguous, parse_number, question, settled
-from sprag.service.reading.texts import did_you_mean
-from sprag.service.spec.table_text import (
+from sprag_study.service.http.web.form.entries import Faults, Values
+from sprag_study.service.http.web.form.fields import Groups
+from sprag_study.service.http.web.form.parts import PARTS, count_of, drop
+from sprag_study.service.languages import ENGLISH, current, gettext
+from sprag_study.service.reading.numbers import WITHOUT_DOUBT, is_ambiguous, parse_number, question, settled
+from sprag_study.service.reading.texts import did_you_mean
+from sprag_study.service.spec.table_text import (
     MAX_HEADING,
     heading_of,
     settled_table,

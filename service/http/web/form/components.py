@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from sprag.service.http.web.form.entries import Values
-from sprag.service.http.web.form.machine import BASE, form_of, rows_of
-from sprag.service.reading.numbers import whole_number
-from sprag.service.storage.components import ComponentRecord
-from sprag.worker.models.form import Rows
+from sprag_study.service.http.web.form.entries import Values
+from sprag_study.service.http.web.form.machine import BASE, form_of, rows_of
+from sprag_study.service.reading.numbers import whole_number
+from sprag_study.service.storage.components import ComponentRecord
+from sprag_study.worker.models.form import Rows
 
 
 def component_groups(

@@ -6,9 +6,9 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from sprag.service.reading.numbers import in_language, settled, with_point
-from sprag.service.reading.printed import could_be_values, keyboard
-from sprag.service.reading.together import split_list, with_last_unit, with_unit_of_range
+from sprag_study.service.reading.numbers import in_language, settled, with_point
+from sprag_study.service.reading.printed import could_be_values, keyboard
+from sprag_study.service.reading.together import split_list, with_last_unit, with_unit_of_range
 
 Values = dict[str, str]
 Faults = dict[str, list[str]]

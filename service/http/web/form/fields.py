@@ -11,14 +11,14 @@ import re
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
-from sprag.service.languages import ENGLISH, N_, _, current
-from sprag.service.reading.reader import Reading
-from sprag.service.reading.units import examples
-from sprag.service.reading.wording import number, words
-from sprag.service.spec.described import ANY_RUN, DURATION, SETTLED_RUN, Described
-from sprag.service.spec.kinds import goal, refine
-from sprag.worker import models
-from sprag.worker.models import Parameter
+from sprag_study.service.languages import ENGLISH, N_, _, current
+from sprag_study.service.reading.reader import Reading
+from sprag_study.service.reading.units import examples
+from sprag_study.service.reading.wording import number, words
+from sprag_study.service.spec.described import ANY_RUN, DURATION, SETTLED_RUN, Described
+from sprag_study.service.spec.kinds import goal, refine
+from sprag_study.worker import models
+from sprag_study.worker.models import Parameter
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.service.http.web.form.entries import (
+from sprag_study.service.http.web.form.entries import (
     Faults,
     Values,
     list_of,
@@ -15,18 +15,18 @@ from sprag.service.http.web.form.entries import (
     text_of,
     unclear,
 )
-from sprag.service.http.web.form.machine import model_name
-from sprag.service.http.web.form.parts import PARTS, count_of
-from sprag.service.http.web.form.rows import field_of_row, filled, items_of_part, values_of_part
-from sprag.service.languages import _
-from sprag.service.reading.numbers import in_language, parse_number
-from sprag.service.reading.together import with_last_unit
-from sprag.service.reading.units import exact_quantity
-from sprag.service.spec.kinds.goal import GOAL
-from sprag.worker import models
+from sprag_study.service.http.web.form.machine import model_name
+from sprag_study.service.http.web.form.parts import PARTS, count_of
+from sprag_study.service.http.web.form.rows import field_of_row, filled, items_of_part, values_of_part
+from sprag_study.service.languages import _
+from sprag_study.service.reading.numbers import in_language, parse_number
+from sprag_study.service.reading.together import with_last_unit
+from sprag_study.service.reading.units import exact_quantity
+from sprag_study.service.spec.kinds.goal import GOAL
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
-    from sprag.service.reading.reader import Reading
+    from sprag_study.service.reading.reader import Reading
 
 #: What a search asks for in a form that was not about one.
 GOAL_DEFAULTS: Final[Values] = {

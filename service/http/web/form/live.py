@@ -11,37 +11,37 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from fastapi import Query
 from starlette.responses import Response
 
-from sprag.service.http.current import current
-from sprag.service.http.problems import ApiError
-from sprag.service.http.respond import json_response
-from sprag.service.http.routers import page_router
-from sprag.service.http.threads import in_thread
-from sprag.service.http.web.figures.live import along, live_case, values_of_result
-from sprag.service.http.web.form.beginning import beginning
-from sprag.service.http.web.form.entries import Values, plain
-from sprag.service.http.web.form.machine import BASE, choices_of, entries, form_of, model_name, row_of
-from sprag.service.http.web.form.machine_spec import base_of
-from sprag.service.http.web.form.own_machine import single_machine
-from sprag.service.http.web.form.sent import ends_of, settle
-from sprag.service.http.web.form.spec import spec_of, values_of
-from sprag.service.http.web.form.values import Form
-from sprag.service.http.web.templates import fragment
-from sprag.service.http.work import Attended, Work
-from sprag.service.reading.reader import meanings, reading_for
-from sprag.service.results.regimes import motion_sentence
-from sprag.service.spec.document import parse_spec
-from sprag.service.spec.kinds.registry import without_cases
-from sprag.service.spec.machine.shaft_check import NotCompiledError
-from sprag.service.spec.report import SpecError
-from sprag.worker import models
-from sprag.worker.pool.child_pool import JobStoppedError
+from sprag_study.service.http.current import current
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.http.respond import json_response
+from sprag_study.service.http.routers import page_router
+from sprag_study.service.http.threads import in_thread
+from sprag_study.service.http.web.figures.live import along, live_case, values_of_result
+from sprag_study.service.http.web.form.beginning import beginning
+from sprag_study.service.http.web.form.entries import Values, plain
+from sprag_study.service.http.web.form.machine import BASE, choices_of, entries, form_of, model_name, row_of
+from sprag_study.service.http.web.form.machine_spec import base_of
+from sprag_study.service.http.web.form.own_machine import single_machine
+from sprag_study.service.http.web.form.sent import ends_of, settle
+from sprag_study.service.http.web.form.spec import spec_of, values_of
+from sprag_study.service.http.web.form.values import Form
+from sprag_study.service.http.web.templates import fragment
+from sprag_study.service.http.work import Attended, Work
+from sprag_study.service.reading.reader import meanings, reading_for
+from sprag_study.service.results.regimes import motion_sentence
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.kinds.registry import without_cases
+from sprag_study.service.spec.machine.shaft_check import NotCompiledError
+from sprag_study.service.spec.report import SpecError
+from sprag_study.worker import models
+from sprag_study.worker.pool.child_pool import JobStoppedError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from sprag.service.http.context import Context
-    from sprag.service.reading.reader import Reading
-    from sprag.worker.study import Study
+    from sprag_study.service.http.context import Context
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.worker.study import Study
 
 router = page_router()
 _LOG: Final = logging.getLogger("sprag.service")

@@ -1,4 +1,4 @@
-"""The machine of a form as blocks of fields, made from the form of its model (`sprag.worker.models.form`).
+"""The machine of a form as blocks of fields, made from the form of its model (`sprag_study.worker.models.form`).
 
 Which fields a block has follows from the choices made so far. The name of a field is the JSON Pointer of its value in
 the spec; that of a choice of the form's own is where its object would be.
@@ -11,19 +11,19 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, Literal
 
-from sprag.service.http.web.form.entries import count_in
-from sprag.service.http.web.form.fields import FORM_MODEL, Choice, Field, Groups, described, field_for, label_of
-from sprag.service.languages import _
-from sprag.service.reading.reader import part_label, shown
-from sprag.service.reading.wording import words
-from sprag.service.spec.described import Described, below
-from sprag.service.spec.machine.registry import part_of
-from sprag.service.spec.node import Node
-from sprag.service.spec.report import Report
-from sprag.worker import models
-from sprag.worker.models import Parameter
-from sprag.worker.models import form as data
-from sprag.worker.models.parameters import general_path, model_parameter
+from sprag_study.service.http.web.form.entries import count_in
+from sprag_study.service.http.web.form.fields import FORM_MODEL, Choice, Field, Groups, described, field_for, label_of
+from sprag_study.service.languages import _
+from sprag_study.service.reading.reader import part_label, shown
+from sprag_study.service.reading.wording import words
+from sprag_study.service.spec.described import Described, below
+from sprag_study.service.spec.machine.registry import part_of
+from sprag_study.service.spec.node import Node
+from sprag_study.service.spec.report import Report
+from sprag_study.worker import models
+from sprag_study.worker.models import Parameter
+from sprag_study.worker.models import form as data
+from sprag_study.worker.models.parameters import general_path, model_parameter
 
 BASE: Final = "/base"
 #: What the form of a model says of a field instead of its catalogue.

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any, Final
 
-from sprag.service.faults import Fault
-from sprag.service.http.web.form.entries import (
+from sprag_study.service.faults import Fault
+from sprag_study.service.http.web.form.entries import (
     Faults,
     Values,
     entries_of,
@@ -16,17 +16,17 @@ from sprag.service.http.web.form.entries import (
     plain,
     text_of,
 )
-from sprag.service.http.web.form.machine import BASE, Entry, entries, form_of, rows_of
-from sprag.service.languages import N_, _, gettext
-from sprag.service.reading.faults import allowed_text, fault_text
-from sprag.service.reading.numbers import parse_number
-from sprag.service.reading.part_names import lower_first
-from sprag.service.reading.printed import could_be_several
-from sprag.service.reading.together import with_last_unit
-from sprag.service.reading.units import QuantityError, parse_quantity, split_typed
-from sprag.service.reading.wording import unit_text
-from sprag.service.spec.measured import MeasuredDataError, parse_measured
-from sprag.worker.models.form import FormChoice, FormField
+from sprag_study.service.http.web.form.machine import BASE, Entry, entries, form_of, rows_of
+from sprag_study.service.languages import N_, _, gettext
+from sprag_study.service.reading.faults import allowed_text, fault_text
+from sprag_study.service.reading.numbers import parse_number
+from sprag_study.service.reading.part_names import lower_first
+from sprag_study.service.reading.printed import could_be_several
+from sprag_study.service.reading.together import with_last_unit
+from sprag_study.service.reading.units import QuantityError, parse_quantity, split_typed
+from sprag_study.service.reading.wording import unit_text
+from sprag_study.service.spec.measured import MeasuredDataError, parse_measured
+from sprag_study.worker.models.form import FormChoice, FormField
 
 _STEP: Final = (N_("from"), N_("to"), N_("value"))
 #: Heading and unit of the columns of tables.

@@ -7,18 +7,18 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
-from sprag.service.http.problems import ApiError
-from sprag.service.spec.derive import with_values
-from sprag.service.spec.document import parse_spec
-from sprag.service.spec.kinds.registry import WHICH_CASES, without_cases
-from sprag.service.spec.stored import accepted
-from sprag.worker import models
-from sprag.worker.limits import MAX_ADDRESS_BYTES
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.spec.derive import with_values
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.kinds.registry import WHICH_CASES, without_cases
+from sprag_study.service.spec.stored import accepted
+from sprag_study.worker import models
+from sprag_study.worker.limits import MAX_ADDRESS_BYTES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
 
 #: Parameters of an address that describe a machine: base and run of its spec as JSON, and its title.
 FIELDS: Final = ("base", "run", "title")

@@ -14,24 +14,24 @@ from typing import Annotated, Any, Final
 from fastapi import Query, Request
 from starlette.responses import RedirectResponse, Response
 
-from sprag.sentences import Sentence
-from sprag.service.faults import FaultError
-from sprag.service.figures.drawings import rough_drawings
-from sprag.service.http.context import Context, Ctx, study_with
-from sprag.service.http.current import current
-from sprag.service.http.problems import ApiError, api_error
-from sprag.service.http.respond import json_response
-from sprag.service.http.routers import page_router
-from sprag.service.http.threads import in_thread
-from sprag.service.http.views import preset_of
-from sprag.service.http.web.form import study_check
-from sprag.service.http.web.form.beginning import beginning, examples_of
-from sprag.service.http.web.form.cases import kinds, methods
-from sprag.service.http.web.form.check import Checked
-from sprag.service.http.web.form.columns import take_columns
-from sprag.service.http.web.form.components import component_groups, rows_with_components, take_component
-from sprag.service.http.web.form.entries import Values, plain, text_of
-from sprag.service.http.web.form.fields import (
+from sprag_study.sentences import Sentence
+from sprag_study.service.faults import FaultError
+from sprag_study.service.figures.drawings import rough_drawings
+from sprag_study.service.http.context import Context, Ctx, study_with
+from sprag_study.service.http.current import current
+from sprag_study.service.http.problems import ApiError, api_error
+from sprag_study.service.http.respond import json_response
+from sprag_study.service.http.routers import page_router
+from sprag_study.service.http.threads import in_thread
+from sprag_study.service.http.views import preset_of
+from sprag_study.service.http.web.form import study_check
+from sprag_study.service.http.web.form.beginning import beginning, examples_of
+from sprag_study.service.http.web.form.cases import kinds, methods
+from sprag_study.service.http.web.form.check import Checked
+from sprag_study.service.http.web.form.columns import take_columns
+from sprag_study.service.http.web.form.components import component_groups, rows_with_components, take_component
+from sprag_study.service.http.web.form.entries import Values, plain, text_of
+from sprag_study.service.http.web.form.fields import (
     FORM_MODEL,
     Groups,
     categories,
@@ -40,33 +40,33 @@ from sprag.service.http.web.form.fields import (
     run_fields,
     search_fields,
 )
-from sprag.service.http.web.form.goal import GOAL_DEFAULTS, with_own_units, with_shown_units
-from sprag.service.http.web.form.live import live_answer, named_numbers
-from sprag.service.http.web.form.machine import BASE, choices_of, entries, form_of, model_name
-from sprag.service.http.web.form.machine_spec import base_of, values_of_base
-from sprag.service.http.web.form.own_machine import own_spec
-from sprag.service.http.web.form.parts import count_of, parts_of, reshape, share, unshared
-from sprag.service.http.web.form.rows import LIMITS
-from sprag.service.http.web.form.sent import changed_kinds, let_vary, settle
-from sprag.service.http.web.form.sheet import Sheet, preferred, sheet_of
-from sprag.service.http.web.form.spec import REFINE_DEFAULTS, is_search, values_of
-from sprag.service.http.web.form.tolerances import BATCH, OWN, distributions, drive_fields, own_name, with_batch
-from sprag.service.http.web.form.undo import history_of, remember, undo
-from sprag.service.http.web.form.values import Form
-from sprag.service.http.web.templates import fragment, page, spec_text
-from sprag.service.http.work import Attended, Work
-from sprag.service.jobs.submission import Submission, take_in
-from sprag.service.presets import preset_names
-from sprag.service.reading.numbers import whole_number
-from sprag.service.reading.quantities import Units
-from sprag.service.reading.reader import Reading
-from sprag.service.reading.together import split_list
-from sprag.service.reading.units import QuantityError, parse_quantity
-from sprag.service.spec.design import design_spec
-from sprag.service.spec.document import UNNAMED
-from sprag.service.spec.kinds.registry import without_cases
-from sprag.service.spec.stored import accepted
-from sprag.worker import models
+from sprag_study.service.http.web.form.goal import GOAL_DEFAULTS, with_own_units, with_shown_units
+from sprag_study.service.http.web.form.live import live_answer, named_numbers
+from sprag_study.service.http.web.form.machine import BASE, choices_of, entries, form_of, model_name
+from sprag_study.service.http.web.form.machine_spec import base_of, values_of_base
+from sprag_study.service.http.web.form.own_machine import own_spec
+from sprag_study.service.http.web.form.parts import count_of, parts_of, reshape, share, unshared
+from sprag_study.service.http.web.form.rows import LIMITS
+from sprag_study.service.http.web.form.sent import changed_kinds, let_vary, settle
+from sprag_study.service.http.web.form.sheet import Sheet, preferred, sheet_of
+from sprag_study.service.http.web.form.spec import REFINE_DEFAULTS, is_search, values_of
+from sprag_study.service.http.web.form.tolerances import BATCH, OWN, distributions, drive_fields, own_name, with_batch
+from sprag_study.service.http.web.form.undo import history_of, remember, undo
+from sprag_study.service.http.web.form.values import Form
+from sprag_study.service.http.web.templates import fragment, page, spec_text
+from sprag_study.service.http.work import Attended, Work
+from sprag_study.service.jobs.submission import Submission, take_in
+from sprag_study.service.presets import preset_names
+from sprag_study.service.reading.numbers import whole_number
+from sprag_study.service.reading.quantities import Units
+from sprag_study.service.reading.reader import Reading
+from sprag_study.service.reading.together import split_list
+from sprag_study.service.reading.units import QuantityError, parse_quantity
+from sprag_study.service.spec.design import design_spec
+from sprag_study.service.spec.document import UNNAMED
+from sprag_study.service.spec.kinds.registry import without_cases
+from sprag_study.service.spec.stored import accepted
+from sprag_study.worker import models
 
 router = page_router()
 

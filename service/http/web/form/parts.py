@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from sprag.service.http.web.form.entries import Values, count_in
-from sprag.service.http.web.form.machine import BASE, entries, form_of
-from sprag.service.http.web.form.tolerances import OWN
-from sprag.service.reading.numbers import whole_number
-from sprag.service.spec.kinds.goal import GOAL
-from sprag.worker.limits import MAX_AXES
-from sprag.worker.models.form import Rows
+from sprag_study.service.http.web.form.entries import Values, count_in
+from sprag_study.service.http.web.form.machine import BASE, entries, form_of
+from sprag_study.service.http.web.form.tolerances import OWN
+from sprag_study.service.reading.numbers import whole_number
+from sprag_study.service.spec.kinds.goal import GOAL
+from sprag_study.worker.limits import MAX_AXES
+from sprag_study.worker.models.form import Rows
 
 
 @dataclass(frozen=True, slots=True)

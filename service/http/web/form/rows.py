@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from sprag.service.http.web.form.entries import (
+from sprag_study.service.http.web.form.entries import (
     Values,
     list_of,
     list_text,
@@ -16,11 +16,11 @@ from sprag.service.http.web.form.entries import (
     range_of,
     text_of,
 )
-from sprag.service.http.web.form.parts import PARTS, count_of
-from sprag.service.languages import N_
-from sprag.service.reading.together import with_last_unit
-from sprag.service.spec.axes.axes import SWEPT
-from sprag.service.spec.axes.sample import SCALE
+from sprag_study.service.http.web.form.parts import PARTS, count_of
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.together import with_last_unit
+from sprag_study.service.spec.axes.axes import SWEPT
+from sprag_study.service.spec.axes.sample import SCALE
 
 #: Fields of an axis for each way of giving its values.
 WAYS: Final = {

@@ -9,14 +9,14 @@ import re
 from collections.abc import Mapping
 from typing import Final
 
-from sprag.service.http.web.form.entries import Values, names_of
-from sprag.service.http.web.form.machine import BASE, entries, form_of, model_name, row_of
-from sprag.service.http.web.form.parts import PARTS, count_of, drop, reshape, with_tolerances
-from sprag.service.http.web.form.spec import is_search
-from sprag.service.reading.quantities import is_si
-from sprag.service.reading.units import QuantityError, split_quantity
-from sprag.worker import models
-from sprag.worker.models.form import FormChoice, Rows
+from sprag_study.service.http.web.form.entries import Values, names_of
+from sprag_study.service.http.web.form.machine import BASE, entries, form_of, model_name, row_of
+from sprag_study.service.http.web.form.parts import PARTS, count_of, drop, reshape, with_tolerances
+from sprag_study.service.http.web.form.spec import is_search
+from sprag_study.service.reading.quantities import is_si
+from sprag_study.service.reading.units import QuantityError, split_quantity
+from sprag_study.worker import models
+from sprag_study.worker.models.form import FormChoice, Rows
 
 #: Beginnings of the names of a unit beside a number, of the tick at a number that varies, of the one at numbers that
 #: vary alike and of those that it is about; of the numbers that have a tick, by the list of what varies.

@@ -9,27 +9,27 @@ from typing import TYPE_CHECKING, Final
 
 from markupsafe import Markup
 
-from sprag.service.figures.drawing import Dimension, Drawing, Side, balanced, rows_of, svg, with_leaders
-from sprag.service.figures.drawings import BETWEEN_FIELDS
-from sprag.service.figures.painter.elements import text_width
-from sprag.service.http.web.form.entries import Values, names_of, plain
-from sprag.service.http.web.form.machine import BASE, Block, Entry, blocks, form_of, model_name
-from sprag.service.http.web.form.parts import PARTS, count_of
-from sprag.service.http.web.form.sent import IN_ROW, part_of, varied
-from sprag.service.languages import _
-from sprag.service.reading.cyrillic import latin
-from sprag.service.reading.numbers import parse_number
-from sprag.service.reading.part_names import lower_first
-from sprag.service.reading.quantities import SI, offered, read_units, workshop_units
-from sprag.service.reading.reader import Reading
-from sprag.service.reading.together import with_last_unit
-from sprag.service.reading.units import QuantityError, parse_quantity, plain_signs
-from sprag.service.reading.wording import number, unit_text
-from sprag.worker.models.form import FormChoice
-from sprag.worker.models.parameters import model_parameter
+from sprag_study.service.figures.drawing import Dimension, Drawing, Side, balanced, rows_of, svg, with_leaders
+from sprag_study.service.figures.drawings import BETWEEN_FIELDS
+from sprag_study.service.figures.painter.elements import text_width
+from sprag_study.service.http.web.form.entries import Values, names_of, plain
+from sprag_study.service.http.web.form.machine import BASE, Block, Entry, blocks, form_of, model_name
+from sprag_study.service.http.web.form.parts import PARTS, count_of
+from sprag_study.service.http.web.form.sent import IN_ROW, part_of, varied
+from sprag_study.service.languages import _
+from sprag_study.service.reading.cyrillic import latin
+from sprag_study.service.reading.numbers import parse_number
+from sprag_study.service.reading.part_names import lower_first
+from sprag_study.service.reading.quantities import SI, offered, read_units, workshop_units
+from sprag_study.service.reading.reader import Reading
+from sprag_study.service.reading.together import with_last_unit
+from sprag_study.service.reading.units import QuantityError, parse_quantity, plain_signs
+from sprag_study.service.reading.wording import number, unit_text
+from sprag_study.worker.models.form import FormChoice
+from sprag_study.worker.models.parameters import model_parameter
 
 if TYPE_CHECKING:
-    from sprag.service.http.web.form.fields import Groups
+    from sprag_study.service.http.web.form.fields import Groups
 
 #: Fields at both sides of a drawing: their distance from it and from each other, the latter also of a mechanism, what
 #: tolerances and a label of two lines add to it, and the place of a line's end in a field (px).

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
-from sprag.service.http.web.form.cases import (
+from sprag_study.service.http.web.form.cases import (
     blocks_of,
     case_values,
     exclusions_of,
@@ -14,25 +14,25 @@ from sprag.service.http.web.form.cases import (
     field_of_exclusion,
     repeated_limits,
 )
-from sprag.service.http.web.form.entries import (
+from sprag_study.service.http.web.form.entries import (
     Faults,
     Values,
     names_of,
     plain,
     text_of,
 )
-from sprag.service.http.web.form.goal import GOAL_DEFAULTS, field_of_goal, goal_of, goal_values
-from sprag.service.http.web.form.machine import form_of, model_name
-from sprag.service.http.web.form.machine_spec import base_of, field_of_base, values_of_base
-from sprag.service.http.web.form.rows import field_of_row, filled, items_of_part, values_of_part
-from sprag.service.http.web.form.tolerances import FIELDS as TOLERANT
-from sprag.service.http.web.form.tolerances import field_of_tolerance, tolerance_values, tolerances_of, with_batch
-from sprag.service.reading.together import with_last_unit
-from sprag.service.spec.derive import formulas_of, with_values
-from sprag.service.spec.kinds import refine
-from sprag.service.spec.run import TIMED_DEFAULTS, TIMED_FIELDS, time_text
-from sprag.worker import models
-from sprag.worker.models import SETTLED
+from sprag_study.service.http.web.form.goal import GOAL_DEFAULTS, field_of_goal, goal_of, goal_values
+from sprag_study.service.http.web.form.machine import form_of, model_name
+from sprag_study.service.http.web.form.machine_spec import base_of, field_of_base, values_of_base
+from sprag_study.service.http.web.form.rows import field_of_row, filled, items_of_part, values_of_part
+from sprag_study.service.http.web.form.tolerances import FIELDS as TOLERANT
+from sprag_study.service.http.web.form.tolerances import field_of_tolerance, tolerance_values, tolerances_of, with_batch
+from sprag_study.service.reading.together import with_last_unit
+from sprag_study.service.spec.derive import formulas_of, with_values
+from sprag_study.service.spec.kinds import refine
+from sprag_study.service.spec.run import TIMED_DEFAULTS, TIMED_FIELDS, time_text
+from sprag_study.worker import models
+from sprag_study.worker.models import SETTLED
 
 #: What is asked of a refinement in a form that was not about one.
 REFINE_DEFAULTS: Final[Values] = {

@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from sprag.service.http.web.form.check import Checked, look_over
-from sprag.service.jobs.submission import Submission, submission
-from sprag.service.views.library import Library
+from sprag_study.service.http.web.form.check import Checked, look_over
+from sprag_study.service.jobs.submission import Submission, submission
+from sprag_study.service.views.library import Library
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from datetime import datetime
 
-    from sprag.service.reading.reader import Choice
+    from sprag_study.service.reading.reader import Choice
 
 
 def form(library: Library, values: Mapping[str, str], now: datetime, choice: Choice) -> Checked:

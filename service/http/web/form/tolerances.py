@@ -7,14 +7,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
-from sprag.service.http.web.form.entries import Values, list_of, list_text, names_of, plain, text_of
-from sprag.service.http.web.form.fields import Field, described
-from sprag.service.http.web.form.machine import entries
-from sprag.service.languages import _
-from sprag.service.reading.wording import words
-from sprag.service.spec.draws.described import DISTRIBUTION
-from sprag.service.spec.fields import expanded
-from sprag.service.spec.kinds.tolerances import DRAWS
+from sprag_study.service.http.web.form.entries import Values, list_of, list_text, names_of, plain, text_of
+from sprag_study.service.http.web.form.fields import Field, described
+from sprag_study.service.http.web.form.machine import entries
+from sprag_study.service.languages import _
+from sprag_study.service.reading.wording import words
+from sprag_study.service.spec.draws.described import DISTRIBUTION
+from sprag_study.service.spec.fields import expanded
+from sprag_study.service.spec.kinds.tolerances import DRAWS
 
 #: Fields of a spec that this part of the form shows.
 FIELDS: Final = ("tolerances", "drives", "seed", "draws")

@@ -11,8 +11,8 @@ import json
 from collections.abc import Mapping
 from typing import Any, Final
 
-from sprag.service.http.web.form.entries import Values
-from sprag.service.http.web.form.values import OLD_NAMES
+from sprag_study.service.http.web.form.entries import Values
+from sprag_study.service.http.web.form.values import OLD_NAMES
 
 HISTORY: Final = "history"
 _MOST: Final = 30

@@ -7,9 +7,9 @@ from urllib.parse import parse_qsl
 
 from fastapi import Depends, Request
 
-from sprag.service.http.problems import ApiError
-from sprag.service.http.web.form.entries import Values
-from sprag.service.languages import _
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.http.web.form.entries import Values
+from sprag_study.service.languages import _
 
 Pairs = list[tuple[str, str]]
 #: Names that fields of older drafts have, and what they are called today.

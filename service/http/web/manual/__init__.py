@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Final
 from markdown_it import MarkdownIt
 from markupsafe import Markup
 
-from sprag.service.http.current import current
-from sprag.service.http.prefix import here
+from sprag_study.service.http.current import current
+from sprag_study.service.http.prefix import here
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

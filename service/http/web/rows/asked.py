@@ -10,23 +10,23 @@ from urllib.parse import urlencode
 
 from starlette.datastructures import QueryParams
 
-from sprag.sentences import plural
-from sprag.service.faults import ParameterFault, SelectionError, refused, shown
-from sprag.service.reading.limits import at_most, span
-from sprag.service.reading.numbers import in_language, is_ambiguous, parse_number
-from sprag.service.reading.printed import keyboard
-from sprag.service.reading.together import with_last_unit
-from sprag.service.results.explore import ExploreQuery, Plan, plan_of
-from sprag.service.views.rows import first_rows, further_infos
-from sprag.worker import models
-from sprag.worker.limits import MAX_SELECTED
+from sprag_study.sentences import plural
+from sprag_study.service.faults import ParameterFault, SelectionError, refused, shown
+from sprag_study.service.reading.limits import at_most, span
+from sprag_study.service.reading.numbers import in_language, is_ambiguous, parse_number
+from sprag_study.service.reading.printed import keyboard
+from sprag_study.service.reading.together import with_last_unit
+from sprag_study.service.results.explore import ExploreQuery, Plan, plan_of
+from sprag_study.service.views.rows import first_rows, further_infos
+from sprag_study.worker import models
+from sprag_study.worker.limits import MAX_SELECTED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.faults import Fault
-    from sprag.service.reading.reader import Reading
-    from sprag.worker.study import Study
+    from sprag_study.service.faults import Fault
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.worker.study import Study
 
 #: A number and what is behind it, and the least digits of a printed result.
 _NUMBER: Final = re.compile(r"([-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?)(.*)", re.DOTALL)

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.directions import case_values
-from sprag.service.results.selection import own_paths
-from sprag.worker import models
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.directions import case_values
+from sprag_study.service.results.selection import own_paths
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.answers import Value
-    from sprag.service.storage.studies.records import CaseRow
-    from sprag.worker.study import Study
+    from sprag_study.service.answers import Value
+    from sprag_study.service.storage.studies.records import CaseRow
+    from sprag_study.worker.study import Study
 
     Line = tuple[str, str, list[Value | None]]
 

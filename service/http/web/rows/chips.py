@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from sprag.service.languages import _
-from sprag.service.reading.reader import plural, shown, word
-from sprag.service.reading.wording import number
-from sprag.service.results.selection import value_of
+from sprag_study.service.languages import _
+from sprag_study.service.reading.reader import plural, shown, word
+from sprag_study.service.reading.wording import number
+from sprag_study.service.results.selection import value_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from sprag.service.http.web.rows.view import RowsPage
-    from sprag.service.reading.reader import Reading
+    from sprag_study.service.http.web.rows.view import RowsPage
+    from sprag_study.service.reading.reader import Reading
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.figures.painter.elements import SMALL, text_width
-from sprag.service.figures.painter.elements import lines_of as lines_of_text
-from sprag.service.results.explore import histogram
-from sprag.service.results.headlines.along import wanted_of
-from sprag.worker.directions import DIRECTIONS, SWEEP
+from sprag_study.service.figures.painter.elements import SMALL, text_width
+from sprag_study.service.figures.painter.elements import lines_of as lines_of_text
+from sprag_study.service.results.explore import histogram
+from sprag_study.service.results.headlines.along import wanted_of
+from sprag_study.worker.directions import DIRECTIONS, SWEEP
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from sprag.service.results.explore import Explored
+    from sprag_study.service.results.explore import Explored
 
 #: Pixels: height of an axis, room above and below it for words, width of the whole, least and most between two axes.
 HEIGHT: Final = 200

@@ -11,49 +11,49 @@ from fastapi import Query, Request
 from starlette.datastructures import QueryParams
 from starlette.responses import RedirectResponse, Response
 
-from sprag.service.faults import SelectionError, refused
-from sprag.service.http.context import Context, Ctx, StudyId
-from sprag.service.http.current import current
-from sprag.service.http.drawing import table
-from sprag.service.http.reading import FileChoice, PageChoice, file_pairs
-from sprag.service.http.routers import page_router
-from sprag.service.http.threads import in_thread
-from sprag.service.http.web.form.page import spec_in_form
-from sprag.service.http.web.form.values import RepeatedForm
-from sprag.service.http.web.held import with_held
-from sprag.service.http.web.rows.asked import MOST_BESIDE, read_asked
-from sprag.service.http.web.rows.beside import lines_of
-from sprag.service.http.web.rows.chips import chips_of
-from sprag.service.http.web.rows.lines import BELOW, HEIGHT, SHADES, TOP
-from sprag.service.http.web.rows.view import RowsPage, rows_view
-from sprag.service.http.web.study import study_frame
-from sprag.service.http.web.templates import page
-from sprag.service.http.work import Attended
-from sprag.service.jobs import checks
-from sprag.service.jobs.submission import take_in
-from sprag.service.json_text import to_bytes
-from sprag.service.languages import _
-from sprag.service.reading.faults import message
-from sprag.service.reading.numbers import whole_number
-from sprag.service.reading.reader import meanings
-from sprag.service.results.explore import ExploreQuery, explored_csv, explored_json
-from sprag.service.results.selection import own_paths
-from sprag.service.spec.longer import runs_over_time
-from sprag.service.views.explore import selection_spec
-from sprag.service.views.library import reading_of
-from sprag.service.views.rows import is_search, rows_of
-from sprag.service.views.study_view import FEW
-from sprag.worker import models
-from sprag.worker.limits import MAX_SELECTED
-from sprag.worker.study import SAME_VALUE
+from sprag_study.service.faults import SelectionError, refused
+from sprag_study.service.http.context import Context, Ctx, StudyId
+from sprag_study.service.http.current import current
+from sprag_study.service.http.drawing import table
+from sprag_study.service.http.reading import FileChoice, PageChoice, file_pairs
+from sprag_study.service.http.routers import page_router
+from sprag_study.service.http.threads import in_thread
+from sprag_study.service.http.web.form.page import spec_in_form
+from sprag_study.service.http.web.form.values import RepeatedForm
+from sprag_study.service.http.web.held import with_held
+from sprag_study.service.http.web.rows.asked import MOST_BESIDE, read_asked
+from sprag_study.service.http.web.rows.beside import lines_of
+from sprag_study.service.http.web.rows.chips import chips_of
+from sprag_study.service.http.web.rows.lines import BELOW, HEIGHT, SHADES, TOP
+from sprag_study.service.http.web.rows.view import RowsPage, rows_view
+from sprag_study.service.http.web.study import study_frame
+from sprag_study.service.http.web.templates import page
+from sprag_study.service.http.work import Attended
+from sprag_study.service.jobs import checks
+from sprag_study.service.jobs.submission import take_in
+from sprag_study.service.json_text import to_bytes
+from sprag_study.service.languages import _
+from sprag_study.service.reading.faults import message
+from sprag_study.service.reading.numbers import whole_number
+from sprag_study.service.reading.reader import meanings
+from sprag_study.service.results.explore import ExploreQuery, explored_csv, explored_json
+from sprag_study.service.results.selection import own_paths
+from sprag_study.service.spec.longer import runs_over_time
+from sprag_study.service.views.explore import selection_spec
+from sprag_study.service.views.library import reading_of
+from sprag_study.service.views.rows import is_search, rows_of
+from sprag_study.service.views.study_view import FEW
+from sprag_study.worker import models
+from sprag_study.worker.limits import MAX_SELECTED
+from sprag_study.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.http.web.rows.asked import Asked
-    from sprag.service.reading.reader import Choice, Reading
-    from sprag.service.views.library import Library
-    from sprag.worker.study import Study
+    from sprag_study.service.http.web.rows.asked import Asked
+    from sprag_study.service.reading.reader import Choice, Reading
+    from sprag_study.service.views.library import Library
+    from sprag_study.worker.study import Study
 
 router = page_router()
 

@@ -6,20 +6,20 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.figures.explore import chosen_pair
-from sprag.service.figures.figure import Direction, Figure, Line, Panel, Quantity
-from sprag.service.figures.read import read_figure
-from sprag.service.figures.svg import svg
-from sprag.service.http.web.rows.lines import SHADES
-from sprag.service.languages import _
-from sprag.service.reading.reader import Phrase
+from sprag_study.service.figures.explore import chosen_pair
+from sprag_study.service.figures.figure import Direction, Figure, Line, Panel, Quantity
+from sprag_study.service.figures.read import read_figure
+from sprag_study.service.figures.svg import svg
+from sprag_study.service.http.web.rows.lines import SHADES
+from sprag_study.service.languages import _
+from sprag_study.service.reading.reader import Phrase
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag.service.http.web.rows.asked import Asked
-    from sprag.service.reading.reader import Reading
-    from sprag.service.results.explore import Explored
+    from sprag_study.service.http.web.rows.asked import Asked
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.service.results.explore import Explored
 
 _WIDTH: Final = 960
 

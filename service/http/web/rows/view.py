@@ -7,21 +7,21 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag.service.http.web.rows.asked import Asked, read_asked
-from sprag.service.http.web.rows.lines import Lines, lines_of, shades_of
-from sprag.service.http.web.rows.points import points_of
-from sprag.service.results.explore import explored_rows
-from sprag.service.results.headlines.along import wanted_of
-from sprag.service.views.library import reading_of
-from sprag.service.views.rows import PLACES, rows_of
+from sprag_study.service.http.web.rows.asked import Asked, read_asked
+from sprag_study.service.http.web.rows.lines import Lines, lines_of, shades_of
+from sprag_study.service.http.web.rows.points import points_of
+from sprag_study.service.results.explore import explored_rows
+from sprag_study.service.results.headlines.along import wanted_of
+from sprag_study.service.views.library import reading_of
+from sprag_study.service.views.rows import PLACES, rows_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.answers.explore import ExploredCase
-    from sprag.service.reading.reader import Choice
-    from sprag.service.results.explore import Condition, Explored, Range
-    from sprag.service.views.library import Library
+    from sprag_study.service.answers.explore import ExploredCase
+    from sprag_study.service.reading.reader import Choice
+    from sprag_study.service.results.explore import Condition, Explored, Range
+    from sprag_study.service.views.library import Library
 
 
 #: Orders of rows that have no shades.

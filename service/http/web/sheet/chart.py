@@ -11,44 +11,51 @@ import numpy as np
 from markupsafe import Markup
 from starlette.datastructures import QueryParams
 
-from sprag.service.figures.curves import curves_figure
-from sprag.service.figures.figure import Note
-from sprag.service.figures.read import read_figure, read_map
-from sprag.service.http.web.figures.drawn import drawn, drawn_map
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.reader import Phrase, joined
-from sprag.service.results.choice import curve_query, map_query, pairs_of
-from sprag.service.results.curves import CurveQuery
-from sprag.service.results.defaults import caption, main_results
-from sprag.service.results.headlines.along import Along, case_sentence, curve_numbers, curve_place, judged_by, place_on
-from sprag.service.results.headlines.batch import asked_like
-from sprag.service.results.headlines.headline import amount
-from sprag.service.results.key_answer_words import curve_name
-from sprag.service.results.key_answers import answers_query, find_answers
-from sprag.service.results.refined import curve_plan
-from sprag.service.results.refined_maps import map_plan
-from sprag.service.results.stored_curves import drawn_curves, stored_map
-from sprag.service.results.tolerances.ribbons import QUANTILES
-from sprag.service.views.calibration import CalibrationView
-from sprag.service.views.drives import RibbonQuery, RibbonView
-from sprag.service.views.front import FrontView
-from sprag.service.views.relatives import asked_by
-from sprag.service.views.study_questions import FrontQuestion
-from sprag.service.views.study_view import found
-from sprag.worker import models
+from sprag_study.service.figures.curves import curves_figure
+from sprag_study.service.figures.figure import Note
+from sprag_study.service.figures.read import read_figure, read_map
+from sprag_study.service.http.web.figures.drawn import drawn, drawn_map
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.reader import Phrase, joined
+from sprag_study.service.results.choice import curve_query, map_query, pairs_of
+from sprag_study.service.results.curves import CurveQuery
+from sprag_study.service.results.defaults import caption, main_results
+from sprag_study.service.results.headlines.along import (
+    Along,
+    case_sentence,
+    curve_numbers,
+    curve_place,
+    judged_by,
+    place_on,
+)
+from sprag_study.service.results.headlines.batch import asked_like
+from sprag_study.service.results.headlines.headline import amount
+from sprag_study.service.results.key_answer_words import curve_name
+from sprag_study.service.results.key_answers import answers_query, find_answers
+from sprag_study.service.results.refined import curve_plan
+from sprag_study.service.results.refined_maps import map_plan
+from sprag_study.service.results.stored_curves import drawn_curves, stored_map
+from sprag_study.service.results.tolerances.ribbons import QUANTILES
+from sprag_study.service.views.calibration import CalibrationView
+from sprag_study.service.views.drives import RibbonQuery, RibbonView
+from sprag_study.service.views.front import FrontView
+from sprag_study.service.views.relatives import asked_by
+from sprag_study.service.views.study_questions import FrontQuestion
+from sprag_study.service.views.study_view import found
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.figures.figure import Figure
-    from sprag.service.reading.reader import Reading
-    from sprag.service.results.choice import MapQuery
-    from sprag.service.results.curves import Curve, Curves
-    from sprag.service.results.key_answers import StudyAnswers
-    from sprag.service.views.library import Library
-    from sprag.service.views.study_view import StudyView
-    from sprag.worker.models import ResultInfo
-    from sprag.worker.study import Study
+    from sprag_study.service.figures.figure import Figure
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.service.results.choice import MapQuery
+    from sprag_study.service.results.curves import Curve, Curves
+    from sprag_study.service.results.key_answers import StudyAnswers
+    from sprag_study.service.views.library import Library
+    from sprag_study.service.views.study_view import StudyView
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.study import Study
 
 #: Parameters of the address that choose curves.
 CHOICES: Final = ("x", "y", "by", "at", "of", "every")

@@ -7,26 +7,26 @@ from urllib.parse import parse_qsl, urlencode
 
 from starlette.datastructures import QueryParams
 
-from sprag.service.http import views
-from sprag.service.http.current import current
-from sprag.service.http.reading import address_pairs, file_pairs
-from sprag.service.http.web.saved_views import saved_here
-from sprag.service.http.web.sheet.chart import CHOICES
-from sprag.service.languages import N_, _
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.results.choice import map_query, pairs_of
-from sprag.service.results.defaults import varying_axes
-from sprag.service.results.refined_maps import map_plan
-from sprag.service.results.regimes import ORDER
-from sprag.worker import models
-from sprag.worker.models.starts import has_starts
+from sprag_study.service.http import views
+from sprag_study.service.http.current import current
+from sprag_study.service.http.reading import address_pairs, file_pairs
+from sprag_study.service.http.web.saved_views import saved_here
+from sprag_study.service.http.web.sheet.chart import CHOICES
+from sprag_study.service.languages import N_, _
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.results.choice import map_query, pairs_of
+from sprag_study.service.results.defaults import varying_axes
+from sprag_study.service.results.refined_maps import map_plan
+from sprag_study.service.results.regimes import ORDER
+from sprag_study.worker import models
+from sprag_study.worker.models.starts import has_starts
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.http.web.sheet.view import Sheet
-    from sprag.service.storage.saved_views import SavedView
-    from sprag.worker.study import Study
+    from sprag_study.service.http.web.sheet.view import Sheet
+    from sprag_study.service.storage.saved_views import SavedView
+    from sprag_study.worker.study import Study
 
 #: Kinds of map: word on the control.
 KINDS: Final = {"heatmap": N_("Colours"), "contour": N_("Lines of equal value")}

@@ -10,24 +10,24 @@ from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
-from sprag.sentences import Amount
-from sprag.service.exports.inputs import inputs
-from sprag.service.figures.drawing import svg
-from sprag.service.figures.drawings import drawings
-from sprag.service.languages import gettext
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.reading.reader import joined
-from sprag.service.reading.wording import number, unit_text
-from sprag.service.results.headlines.headline import DIMENSION_DIGITS
-from sprag.service.results.varied import with_tolerance
-from sprag.worker import models
-from sprag.worker.models.formulas import evaluate
+from sprag_study.sentences import Amount
+from sprag_study.service.exports.inputs import inputs
+from sprag_study.service.figures.drawing import svg
+from sprag_study.service.figures.drawings import drawings
+from sprag_study.service.languages import gettext
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.reader import joined
+from sprag_study.service.reading.wording import number, unit_text
+from sprag_study.service.results.headlines.headline import DIMENSION_DIGITS
+from sprag_study.service.results.varied import with_tolerance
+from sprag_study.worker import models
+from sprag_study.worker.models.formulas import evaluate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from sprag.service.reading.reader import Reading
-    from sprag.worker.study import Study
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.worker.study import Study
 
 
 @dataclass(frozen=True, slots=True)

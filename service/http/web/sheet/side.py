@@ -9,31 +9,31 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from markupsafe import Markup
 
-from sprag.sentences import Name
-from sprag.service.faults import FaultError
-from sprag.service.figures.figure import Line
-from sprag.service.figures.svg import spark
-from sprag.service.languages import N_, gettext
-from sprag.service.reading.part_names import lower_first
-from sprag.service.reading.reader import Phrase, joined, term
-from sprag.service.results.defaults import main_query, varying_axes
-from sprag.service.results.headlines.headline import short_titles
-from sprag.service.results.refined_maps import map_plan
-from sprag.service.results.regimes import DOUBTFUL
-from sprag.service.views.headline import headline_of, is_small
-from sprag.service.views.relatives import asked_by, relatives_of
-from sprag.worker import models
-from sprag.worker.study import SAME_VALUE
+from sprag_study.sentences import Name
+from sprag_study.service.faults import FaultError
+from sprag_study.service.figures.figure import Line
+from sprag_study.service.figures.svg import spark
+from sprag_study.service.languages import N_, gettext
+from sprag_study.service.reading.part_names import lower_first
+from sprag_study.service.reading.reader import Phrase, joined, term
+from sprag_study.service.results.defaults import main_query, varying_axes
+from sprag_study.service.results.headlines.headline import short_titles
+from sprag_study.service.results.refined_maps import map_plan
+from sprag_study.service.results.regimes import DOUBTFUL
+from sprag_study.service.views.headline import headline_of, is_small
+from sprag_study.service.views.relatives import asked_by, relatives_of
+from sprag_study.worker import models
+from sprag_study.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.reading.reader import Reading
-    from sprag.service.storage.studies.records import Kinds, Progress
-    from sprag.service.views.headline import Headline, Trace
-    from sprag.service.views.library import Library
-    from sprag.service.views.relatives import Asked, Relative
-    from sprag.worker.study import Study
+    from sprag_study.service.reading.reader import Reading
+    from sprag_study.service.storage.studies.records import Kinds, Progress
+    from sprag_study.service.views.headline import Headline, Trace
+    from sprag_study.service.views.library import Library
+    from sprag_study.service.views.relatives import Asked, Relative
+    from sprag_study.worker.study import Study
 
 #: Variants that stand beside each other.
 _VARIANTS: Final = 5

@@ -7,31 +7,31 @@ from typing import TYPE_CHECKING, Any
 
 from starlette.datastructures import QueryParams
 
-from sprag.service.faults import SelectionError
-from sprag.service.http.web.held import fixed_choices, with_held
-from sprag.service.http.web.sheet.chart import CHOICES, chart_of, chosen_curves, point_of
-from sprag.service.http.web.sheet.machine import Machine, machine_of
-from sprag.service.http.web.sheet.side import Side, side_of
-from sprag.service.http.web.view_forms import Fact, fact_of
-from sprag.service.reading.catalogue import unit_of
-from sprag.service.results.choice import value_choices
-from sprag.service.results.headlines.headline import short_titles
-from sprag.service.spec.fields import renamed
-from sprag.service.views.headline import headline_of, usual_query
-from sprag.service.views.library import reading_of
-from sprag.service.views.relatives import asked_by
+from sprag_study.service.faults import SelectionError
+from sprag_study.service.http.web.held import fixed_choices, with_held
+from sprag_study.service.http.web.sheet.chart import CHOICES, chart_of, chosen_curves, point_of
+from sprag_study.service.http.web.sheet.machine import Machine, machine_of
+from sprag_study.service.http.web.sheet.side import Side, side_of
+from sprag_study.service.http.web.view_forms import Fact, fact_of
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.results.choice import value_choices
+from sprag_study.service.results.headlines.headline import short_titles
+from sprag_study.service.spec.fields import renamed
+from sprag_study.service.views.headline import headline_of, usual_query
+from sprag_study.service.views.library import reading_of
+from sprag_study.service.views.relatives import asked_by
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from sprag.service.faults import Fault
-    from sprag.service.http.web.sheet.chart import Chart
-    from sprag.service.reading.reader import Choice, Reading
-    from sprag.service.results.curves import CurveQuery
-    from sprag.service.results.headlines.headline import Gap
-    from sprag.service.views.headline import Headline
-    from sprag.service.views.library import Library
-    from sprag.worker.study import Study
+    from sprag_study.service.faults import Fault
+    from sprag_study.service.http.web.sheet.chart import Chart
+    from sprag_study.service.reading.reader import Choice, Reading
+    from sprag_study.service.results.curves import CurveQuery
+    from sprag_study.service.results.headlines.headline import Gap
+    from sprag_study.service.views.headline import Headline
+    from sprag_study.service.views.library import Library
+    from sprag_study.worker.study import Study
 
 
 @dataclass(frozen=True, slots=True)

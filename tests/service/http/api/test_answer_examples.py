@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 import jsonschema
 import pytest
 
-from sprag.service.http.api import answer_examples
-from sprag.service.http.api.answer_examples import TEXTS
-from sprag.worker.models.tasks import chunk_task, run_task
+from sprag_study.service.http.api import answer_examples
+from sprag_study.service.http.api.answer_examples import TEXTS
+from sprag_study.worker.models.tasks import chunk_task, run_task
 from tests.conftest import ROOT
 from tests.service import conftest
 from tests.service.conftest import made_up
@@ -27,8 +27,8 @@ from tests.service.http.api.test_openapi import operations, sent_to, studied
 if TYPE_CHECKING:
     import httpx
 
-    from sprag.worker.models import ChunkResult
-    from sprag.worker.study import Study
+    from sprag_study.worker.models import ChunkResult
+    from sprag_study.worker.study import Study
     from tests.service.conftest import Service
 
 RECORD = f"record them: see {Path(__file__).name}"

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from pydantic import TypeAdapter
 
-from sprag.service.answers.results import Branch
-from sprag.service.client import Client
+from sprag_study.service.answers.results import Branch
+from sprag_study.service.client import Client
 from tests.service.conftest import API, PortalTransport, Service
 from tests.service.spec_sample import changed
 

@@ -9,11 +9,11 @@ from functools import partial
 
 import pytest
 
-from sprag.service.answers.calibration import CalibrationReport
-from sprag.service.report.document import report_of
-from sprag.service.results import calibration as calibration_module
-from sprag.service.results.calibration import calibration_json, calibration_of
-from sprag.service.views.library import Library
+from sprag_study.service.answers.calibration import CalibrationReport
+from sprag_study.service.report.document import report_of
+from sprag_study.service.results import calibration as calibration_module
+from sprag_study.service.results.calibration import calibration_json, calibration_of
+from sprag_study.service.views.library import Library
 from tests.service.calibrating import DAMPING, INERTIA, calibration
 from tests.service.conftest import API, Service
 from tests.service.shapes import fits

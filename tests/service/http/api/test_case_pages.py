@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.service.client import Client
-from sprag.worker.models import REGIME_SENTENCES
+from sprag_study.service.client import Client
+from sprag_study.worker.models import REGIME_SENTENCES
 from tests.service.conftest import API, PortalTransport, Service
 from tests.service.spec_sample import changed
 

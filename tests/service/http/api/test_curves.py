@@ -11,20 +11,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from sprag.service.answers import results
-from sprag.service.faults import SelectionError
-from sprag.service.http import respond
-from sprag.service.results.curve_cases import select
-from sprag.service.results.curves import CurveQuery
-from sprag.worker import models
+from sprag_study.service.answers import results
+from sprag_study.service.faults import SelectionError
+from sprag_study.service.http import respond
+from sprag_study.service.results.curve_cases import select
+from sprag_study.service.results.curves import CurveQuery
+from sprag_study.worker import models
 from tests.service.shapes import fits
 
 if TYPE_CHECKING:
     import httpx
     from conftest import Service
 
-    from sprag.worker.models import ChunkResult
-    from sprag.worker.study import Study
+    from sprag_study.worker.models import ChunkResult
+    from sprag_study.worker.study import Study
 
 API = "/api/v1"
 TIED = ["excitation.amplitude_x", "excitation.amplitude_y"]
@@ -231,7 +231,7 @@ def test_many_numbers_are_written_by_a_process_that_checks(
     here = service.http.get(address.format(study_id))
     assert here.status_code == 200
     assert service.checker.calls == []
-    monkeypatch.setattr("sprag.service.views.study_view.FEW", 0)
+    monkeypatch.setattr("sprag_study.service.views.study_view.FEW", 0)
     elsewhere = service.http.get(address.format(study_id))
     assert len(service.checker.calls) == 1
     pickle.dumps(service.checker.calls)

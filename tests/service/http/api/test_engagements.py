@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from sprag.service.answers import results
-from sprag.service.client import Client
-from sprag.worker import models
+from sprag_study.service.answers import results
+from sprag_study.service.client import Client
+from sprag_study.worker import models
 from tests.service.conftest import API, PortalTransport, Service
 from tests.service.shapes import fits
 

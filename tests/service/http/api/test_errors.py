@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from sprag.service.http.problems import PROBLEM_TYPES, Problem
-from sprag.service.storage.errors import DatabaseBusyError, DatabaseFullError
-from sprag.worker.limits import MAX_BODY_BYTES
+from sprag_study.service.http.problems import PROBLEM_TYPES, Problem
+from sprag_study.service.storage.errors import DatabaseBusyError, DatabaseFullError
+from sprag_study.worker.limits import MAX_BODY_BYTES
 from tests.service.http.routes import every_route
 from tests.service.timed_spec import SPEC
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from sprag.service.answers import studies
-from sprag.service.http import streams
+from sprag_study.service.answers import studies
+from sprag_study.service.http import streams
 from tests.service.shapes import fits
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import re
 
 import pytest
 
-from sprag.service.answers.goals import FrontReport
+from sprag_study.service.answers.goals import FrontReport
 from tests.service.conftest import API, Service
 from tests.service.searching import rows_of, search
 from tests.service.shapes import fits

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from anyio.from_thread import BlockingPortal
 
-from sprag.service.http.api.examples import EXTENSION_AXES
+from sprag_study.service.http.api.examples import EXTENSION_AXES
 from tests.service.conftest import PortalTransport, Service
 from tests.service.timed_spec import SPEC
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import sqlalchemy as sa
 
-from sprag.worker.models import ChunkResult, study_results
-from sprag.worker.reuse import no_cases
+from sprag_study.worker.models import ChunkResult, study_results
+from sprag_study.worker.reuse import no_cases
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service
@@ -63,7 +63,7 @@ def test_what_a_finished_study_tells_is_final(
     with monkeypatch.context() as patched:
         ending = Ending(service, study_id, after)
         patched.setattr(service.store.session, "read", ending.read)
-        patched.setattr("sprag.service.http.streams.LOOK_SECONDS", 0.0)
+        patched.setattr("sprag_study.service.http.streams.LOOK_SECONDS", 0.0)
         text = service.http.get(address + part).text
     ending.by_now()
     final = service.http.get(address).json()

@@ -13,12 +13,12 @@ from fastapi.routing import iter_route_contexts
 from openapi_spec_validator import OpenAPIV31SpecValidator
 from pydantic import SecretStr
 
-from sprag.service.http.api.components import EXAMPLE as COMPONENTS
-from sprag.service.http.api.examples import SPEC
-from sprag.service.http.api.schedules import EXAMPLE
-from sprag.service.http.app import create_app
-from sprag.service.http.guard import OPEN_PATHS
-from sprag.service.http.problems import PROBLEM_TYPES
+from sprag_study.service.http.api.components import EXAMPLE as COMPONENTS
+from sprag_study.service.http.api.examples import SPEC
+from sprag_study.service.http.api.schedules import EXAMPLE
+from sprag_study.service.http.app import create_app
+from sprag_study.service.http.guard import OPEN_PATHS
+from sprag_study.service.http.problems import PROBLEM_TYPES
 from tests.service.calibrating import calibration
 from tests.service.searching import search
 from tests.service.swept_study import swept_study
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     import httpx
 
-    from sprag.service.settings import Settings
+    from sprag_study.service.settings import Settings
     from tests.service.conftest import Service
 
     Connect = Callable[..., httpx.Client]

@@ -11,9 +11,9 @@ from urllib.parse import urljoin
 
 import pytest
 
-from sprag.service.answers import catalogue, studies
-from sprag.service.http.api.examples import CLUTCH_FIT
-from sprag.worker import models
+from sprag_study.service.answers import catalogue, studies
+from sprag_study.service.http.api.examples import CLUTCH_FIT
+from sprag_study.worker import models
 from tests.service.shapes import fits
 
 if TYPE_CHECKING:

@@ -11,18 +11,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from sprag.service import exports
-from sprag.service.answers import results
-from sprag.service.exports import Source, csv_pieces, json_pieces
-from sprag.service.spec.csv_text import escape
-from sprag.service.storage.studies.records import RowBlock
-from sprag.worker import models
+from sprag_study.service import exports
+from sprag_study.service.answers import results
+from sprag_study.service.exports import Source, csv_pieces, json_pieces
+from sprag_study.service.spec.csv_text import escape
+from sprag_study.service.storage.studies.records import RowBlock
+from sprag_study.worker import models
 from tests.service.shapes import fits
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from sprag.worker.models import ChunkResult
+    from sprag_study.worker.models import ChunkResult
     from tests.service.conftest import Service
 
 API = "/api/v1"

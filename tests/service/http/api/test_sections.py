@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from pydantic import TypeAdapter
 
-from sprag.service.answers.sections import Sections
-from sprag.service.client import Client
+from sprag_study.service.answers.sections import Sections
+from sprag_study.service.client import Client
 from tests.service.conftest import API, PortalTransport, Service
 from tests.service.spec_sample import changed
 

@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.service.client import Client
-from sprag.service.faults import FaultError
-from sprag.service.http.problems import ApiError
-from sprag.service.spec.document import parse_spec
-from sprag.service.views import basin as basins
-from sprag.worker import models
-from sprag.worker.models import Basin, ChunkResult, FurtherRows
-from sprag.worker.models.starts import motion_of
-from sprag.worker.study import Study
+from sprag_study.service.client import Client
+from sprag_study.service.faults import FaultError
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.views import basin as basins
+from sprag_study.worker import models
+from sprag_study.worker.models import Basin, ChunkResult, FurtherRows
+from sprag_study.worker.models.starts import motion_of
+from sprag_study.worker.study import Study
 from tests.service.conftest import API, PortalTransport, Service
 from tests.service.figures.seen import chart_of
 from tests.service.timed_spec import SPEC

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from sprag.service.answers import studies
-from sprag.service.http.api.examples import SPEC_TOML
-from sprag.service.storage.work.room import RESERVE_BYTES, Room
+from sprag_study.service.answers import studies
+from sprag_study.service.http.api.examples import SPEC_TOML
+from sprag_study.service.storage.work.room import RESERVE_BYTES, Room
 from tests.service.shapes import fits
 from tests.service.timed_spec import SPEC
 

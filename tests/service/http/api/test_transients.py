@@ -11,12 +11,12 @@ from typing import Any
 import pytest
 from pydantic import TypeAdapter
 
-from sprag.engine.machine_shaft.transient_course import Course
-from sprag.engine.machine_shaft.transients import transient
-from sprag.service.answers.transients import Transient
-from sprag.service.client import Client
-from sprag.worker.models.common import case_machine
-from sprag.worker.models.machine_shaft import spec_of
+from sprag_study.engine.machine_shaft.transient_course import Course
+from sprag_study.engine.machine_shaft.transients import transient
+from sprag_study.service.answers.transients import Transient
+from sprag_study.service.client import Client
+from sprag_study.worker.models.common import case_machine
+from sprag_study.worker.models.machine_shaft import spec_of
 from tests.service.conftest import API, PortalTransport, Service
 from tests.service.spec_sample import changed
 

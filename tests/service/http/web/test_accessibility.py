@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 from axe_playwright_python.sync_playwright import Axe
 
-from sprag.service.http.roles import ROLES
-from sprag.service.presets import preset_text
-from sprag.service.spec.document import load_spec
+from sprag_study.service.http.roles import ROLES
+from sprag_study.service.presets import preset_text
+from sprag_study.service.spec.document import load_spec
 from tests.acceptance.processes import SECONDS
 from tests.service.calibrating import calibration
 from tests.service.http.web.fields import named

@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 
-from sprag.service.http.web.form.check import check_form
-from sprag.service.http.web.form.page import empty
-from sprag.service.http.web.form.parts import reshape
-from sprag.service.http.web.form.spec import field_of, spec_of, values_of
-from sprag.service.spec.document import parse_spec
-from sprag.worker.chunking import Chunking
+from sprag_study.service.http.web.form.check import check_form
+from sprag_study.service.http.web.form.page import empty
+from sprag_study.service.http.web.form.parts import reshape
+from sprag_study.service.http.web.form.spec import field_of, spec_of, values_of
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.worker.chunking import Chunking
 from tests.service.conftest import Service
 from tests.service.spec_sample import changed
 

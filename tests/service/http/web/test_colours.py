@@ -31,7 +31,7 @@ def _contrast(one: str, other: str) -> float:
 
 @pytest.mark.parametrize("scheme", [0, 1], ids=["light", "dark"])
 def test_text_and_edges_stand_out_in_both_schemes(scheme: int) -> None:
-    style = (files("sprag.service.http.web") / "static" / "sprag.css").read_text(encoding="utf-8")
+    style = (files("sprag_study.service.http.web") / "static" / "sprag.css").read_text(encoding="utf-8")
     blocks = re.findall(r":root \{(.*?)\}", style, re.DOTALL)[:2]
     light, dark = (dict(re.findall(r"--([\w-]+): (#[0-9a-f]{3,6});", block)) for block in blocks)
     colours = {**light, **(dark if scheme else {})}

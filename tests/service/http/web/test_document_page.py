@@ -8,8 +8,8 @@ from urllib.parse import parse_qs, urlsplit
 
 import pytest
 
-from sprag.service.http.web import document
-from sprag.service.report import Office
+from sprag_study.service.http.web import document
+from sprag_study.service.report import Office
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from sprag.service.http.web.form.check import check_form, look_over
-from sprag.service.http.web.form.columns import take_columns
-from sprag.service.http.web.form.machine import choices_of
-from sprag.service.http.web.form.parts import reshape
-from sprag.service.http.web.form.spec import spec_of, values_of
-from sprag.service.http.web.form.undo import history_of, remember, undo
-from sprag.service.presets import preset_text
-from sprag.service.reading.reader import Choice
-from sprag.service.spec.document import format_of, load_spec, parse_spec
-from sprag.worker.chunking import Chunking
+from sprag_study.service.http.web.form.check import check_form, look_over
+from sprag_study.service.http.web.form.columns import take_columns
+from sprag_study.service.http.web.form.machine import choices_of
+from sprag_study.service.http.web.form.parts import reshape
+from sprag_study.service.http.web.form.spec import spec_of, values_of
+from sprag_study.service.http.web.form.undo import history_of, remember, undo
+from sprag_study.service.presets import preset_text
+from sprag_study.service.reading.reader import Choice
+from sprag_study.service.spec.document import format_of, load_spec, parse_spec
+from sprag_study.worker.chunking import Chunking
 from tests.service.spec_sample import SPEC
 
 if TYPE_CHECKING:

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 import pytest
 
 from docs.catalogues import texts
-from sprag.service import languages
-from sprag.service.http.web import manual
-from sprag.service.languages.catalogue import Catalogue, Entry, Key
-from sprag.service.spec.described import ANY_RUN, SETTLED_RUN
-from sprag.service.spec.machine.shaft_parts import MECHANISM_CHOICES, OPERATION_CHOICES
-from sprag.worker.models import ENDING_SENTENCES, REGIME_SENTENCES
-from sprag.worker.models.registry import all_models
+from sprag_study.service import languages
+from sprag_study.service.http.web import manual
+from sprag_study.service.languages.catalogue import Catalogue, Entry, Key
+from sprag_study.service.spec.described import ANY_RUN, SETTLED_RUN
+from sprag_study.service.spec.machine.shaft_parts import MECHANISM_CHOICES, OPERATION_CHOICES
+from sprag_study.worker.models import ENDING_SENTENCES, REGIME_SENTENCES
+from sprag_study.worker.models.registry import all_models
 from tests.service.http.web.test_accessibility import LONG, PAGES, studies
 
 if TYPE_CHECKING:

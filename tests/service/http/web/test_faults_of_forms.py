@@ -8,21 +8,21 @@ from typing import Any
 
 import pytest
 
-from sprag.service import languages
-from sprag.service.http.views import preset_of
-from sprag.service.http.web.form.check import check_form
-from sprag.service.http.web.form.columns import COLUMNS, take_columns
-from sprag.service.http.web.form.machine_spec import step_of
-from sprag.service.http.web.form.page import empty
-from sprag.service.http.web.form.spec import spec_of, values_of
-from sprag.service.reading.faults import allowed_text
-from sprag.service.schedules.deadline import ALLOWED, ALLOWED_OF_RUNS
-from sprag.service.schedules.fields import read_fields
-from sprag.service.schedules.policies import GRACE_ALLOWED
-from sprag.service.schedules.report_to import EMAIL_ALLOWED, LONGEST_WEBHOOK, MOST_RECIPIENTS, WEBHOOK_ALLOWED
-from sprag.service.spec.report import SpecError
-from sprag.worker.chunking import Chunking
-from sprag.worker.limits import MAX_FINISH_DAYS
+from sprag_study.service import languages
+from sprag_study.service.http.views import preset_of
+from sprag_study.service.http.web.form.check import check_form
+from sprag_study.service.http.web.form.columns import COLUMNS, take_columns
+from sprag_study.service.http.web.form.machine_spec import step_of
+from sprag_study.service.http.web.form.page import empty
+from sprag_study.service.http.web.form.spec import spec_of, values_of
+from sprag_study.service.reading.faults import allowed_text
+from sprag_study.service.schedules.deadline import ALLOWED, ALLOWED_OF_RUNS
+from sprag_study.service.schedules.fields import read_fields
+from sprag_study.service.schedules.policies import GRACE_ALLOWED
+from sprag_study.service.schedules.report_to import EMAIL_ALLOWED, LONGEST_WEBHOOK, MOST_RECIPIENTS, WEBHOOK_ALLOWED
+from sprag_study.service.spec.report import SpecError
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.limits import MAX_FINISH_DAYS
 from tests.service.spec_sample import SPEC
 
 CONSTANTS = "/base/constants"

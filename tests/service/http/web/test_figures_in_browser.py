@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from playwright.sync_api import expect
 
-from sprag.service.http.web import script_texts
+from sprag_study.service.http.web import script_texts
 
 if TYPE_CHECKING:
     from tests.service.http.web.conftest import Office, Visitor

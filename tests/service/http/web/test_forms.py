@@ -12,23 +12,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from sprag.service.faults import Fault
-from sprag.service.figures.painter.thinning import thin
-from sprag.service.http.web.form.check import check_form, check_text
-from sprag.service.http.web.form.entries import plain
-from sprag.service.http.web.form.page import empty
-from sprag.service.http.web.form.parts import reshape, share
-from sprag.service.http.web.form.spec import field_of, spec_of, values_of
-from sprag.service.http.web.templates import duration, fragment, time_left
-from sprag.service.presets import preset_names, preset_text
-from sprag.service.reading.faults import message
-from sprag.service.reading.wording import number, symbol, unit_text
-from sprag.service.spec.document import format_of, load_spec, parse_spec
-from sprag.service.views.case_view import see
-from sprag.service.views.trajectory import PhasesView, TrajectoryView
-from sprag.worker import models
-from sprag.worker.chunking import Chunking
-from sprag.worker.study import Study
+from sprag_study.service.faults import Fault
+from sprag_study.service.figures.painter.thinning import thin
+from sprag_study.service.http.web.form.check import check_form, check_text
+from sprag_study.service.http.web.form.entries import plain
+from sprag_study.service.http.web.form.page import empty
+from sprag_study.service.http.web.form.parts import reshape, share
+from sprag_study.service.http.web.form.spec import field_of, spec_of, values_of
+from sprag_study.service.http.web.templates import duration, fragment, time_left
+from sprag_study.service.presets import preset_names, preset_text
+from sprag_study.service.reading.faults import message
+from sprag_study.service.reading.wording import number, symbol, unit_text
+from sprag_study.service.spec.document import format_of, load_spec, parse_spec
+from sprag_study.service.views.case_view import see
+from sprag_study.service.views.trajectory import PhasesView, TrajectoryView
+from sprag_study.worker import models
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.study import Study
 from tests.service.spec_sample import changed
 
 EMPTY_FORM = empty("vibration-drive")

@@ -6,10 +6,10 @@ import re
 
 import pytest
 
-from sprag.service.http.web.form.sent import settle
-from sprag.service.http.web.form.spec import spec_of
-from sprag.service.spec.design import design_spec
-from sprag.service.spec.document import parse_spec
+from sprag_study.service.http.web.form.sent import settle
+from sprag_study.service.http.web.form.spec import spec_of
+from sprag_study.service.spec.design import design_spec
+from sprag_study.service.spec.document import parse_spec
 from tests.service.conftest import Service
 from tests.service.figures.seen import chart_of, seen
 from tests.service.http.web.controls import Controls

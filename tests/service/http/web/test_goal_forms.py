@@ -7,18 +7,18 @@ from typing import Any
 
 import pytest
 
-from sprag.service.http.web.form.check import check_form
-from sprag.service.http.web.form.goal import with_own_units, with_shown_units
-from sprag.service.http.web.form.page import empty
-from sprag.service.http.web.form.parts import reshape
-from sprag.service.http.web.form.sent import settle
-from sprag.service.http.web.form.spec import field_of, spec_of, values_of
-from sprag.service.presets import preset_text
-from sprag.service.reading.quantities import Units
-from sprag.service.reading.reader import Reading
-from sprag.service.spec.document import load_spec, parse_spec
-from sprag.worker.chunking import Chunking
-from sprag.worker.models import SHARE
+from sprag_study.service.http.web.form.check import check_form
+from sprag_study.service.http.web.form.goal import with_own_units, with_shown_units
+from sprag_study.service.http.web.form.page import empty
+from sprag_study.service.http.web.form.parts import reshape
+from sprag_study.service.http.web.form.sent import settle
+from sprag_study.service.http.web.form.spec import field_of, spec_of, values_of
+from sprag_study.service.presets import preset_text
+from sprag_study.service.reading.quantities import Units
+from sprag_study.service.reading.reader import Reading
+from sprag_study.service.spec.document import load_spec, parse_spec
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.models import SHARE
 from tests.service.conftest import Service
 from tests.service.http.web.controls import Controls
 

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from starlette.datastructures import QueryParams
 
-from sprag.service.http.web.good_drives import condition_rows, condition_texts, has_rows
-from sprag.service.presets import preset_text
-from sprag.service.reading.quantities import Units
-from sprag.service.reading.reader import Reading
-from sprag.service.spec.document import format_of, load_spec, parse_spec
+from sprag_study.service.http.web.good_drives import condition_rows, condition_texts, has_rows
+from sprag_study.service.presets import preset_text
+from sprag_study.service.reading.quantities import Units
+from sprag_study.service.reading.reader import Reading
+from sprag_study.service.spec.document import format_of, load_spec, parse_spec
 from tests.service.rounds import computed
 
 if TYPE_CHECKING:

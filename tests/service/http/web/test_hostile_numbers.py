@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from sprag.service.http.web.form.spec import values_of
+from sprag_study.service.http.web.form.spec import values_of
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service

@@ -12,7 +12,7 @@ from playwright.sync_api import expect
 from starlette.concurrency import run_in_threadpool
 
 from benchmarks.faults.harness import free_port
-from sprag.service.http import looks as looking
+from sprag_study.service.http import looks as looking
 from tests.acceptance.processes import SECONDS, service
 from tests.service.timed_spec import SPEC
 

@@ -11,20 +11,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 from playwright.sync_api import expect
 
-from sprag.service.figures.drawings import BETWEEN_FIELDS, drawings
-from sprag.service.http.views import preset_of
-from sprag.service.http.web.form.check import check_form
-from sprag.service.http.web.form.machine import Entry, choices_of, entries
-from sprag.service.http.web.form.machine_spec import base_of, values_of_base
-from sprag.service.http.web.form.page import empty
-from sprag.service.http.web.form.parts import reshape
-from sprag.service.http.web.form.sheet import sheet_of
-from sprag.service.http.web.form.spec import spec_of, values_of
-from sprag.service.http.web.form.undo import history_of
-from sprag.service.presets import preset_names
-from sprag.service.spec.document import parse_spec
-from sprag.worker import models
-from sprag.worker.chunking import Chunking
+from sprag_study.service.figures.drawings import BETWEEN_FIELDS, drawings
+from sprag_study.service.http.views import preset_of
+from sprag_study.service.http.web.form.check import check_form
+from sprag_study.service.http.web.form.machine import Entry, choices_of, entries
+from sprag_study.service.http.web.form.machine_spec import base_of, values_of_base
+from sprag_study.service.http.web.form.page import empty
+from sprag_study.service.http.web.form.parts import reshape
+from sprag_study.service.http.web.form.sheet import sheet_of
+from sprag_study.service.http.web.form.spec import spec_of, values_of
+from sprag_study.service.http.web.form.undo import history_of
+from sprag_study.service.presets import preset_names
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.worker import models
+from sprag_study.worker.chunking import Chunking
 from tests.acceptance.processes import EXAMPLES
 from tests.service.http.web.controls import Controls
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Final
 
 import pytest
 
-from sprag.service.http.web.sheet.machine import machine_of
-from sprag.service.reading.reader import Choice
-from sprag.service.views.library import reading_of
+from sprag_study.service.http.web.sheet.machine import machine_of
+from sprag_study.service.reading.reader import Choice
+from sprag_study.service.views.library import reading_of
 from tests.service.http.web.test_accessibility import preset
 from tests.service.rounds import computed
 from tests.service.spec.machine.test_shaft import PRESS

@@ -9,9 +9,9 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from sprag.service.http.current import knowing
-from sprag.service.http.web.manual import PAGES, manual_page, titles
-from sprag.worker import models
+from sprag_study.service.http.current import knowing
+from sprag_study.service.http.web.manual import PAGES, manual_page, titles
+from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service

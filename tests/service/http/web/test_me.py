@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from playwright.sync_api import expect
 
-from sprag.service.http.web.moved import MOVED, OF_CASE, OF_STUDY
-from sprag.service.languages import language
-from sprag.service.reading.times import in_full, when
-from sprag.service.schedules.plain import cron_of, days_of, deadline_said, said
+from sprag_study.service.http.web.moved import MOVED, OF_CASE, OF_STUDY
+from sprag_study.service.languages import language
+from sprag_study.service.reading.times import in_full, when
+from sprag_study.service.schedules.plain import cron_of, days_of, deadline_said, said
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser

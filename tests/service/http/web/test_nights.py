@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from sprag.service.http.app import chunking, create_app
-from sprag.service.jobs.scheduler import Scheduler
-from sprag.service.settings import Settings
-from sprag.service.storage.people.scopes import TokenScope
-from sprag.service.storage.store import Store
-from sprag.worker.models import ChunkResult
+from sprag_study.service.http.app import chunking, create_app
+from sprag_study.service.jobs.scheduler import Scheduler
+from sprag_study.service.settings import Settings
+from sprag_study.service.storage.people.scopes import TokenScope
+from sprag_study.service.storage.store import Store
+from sprag_study.worker.models import ChunkResult
 from tests.acceptance.processes import SECONDS
 from tests.service.conftest import InThread, made_up
 from tests.service.timed_spec import SPEC
@@ -69,8 +69,8 @@ def house(sqlite_url: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[House]:
 
 def finished_study(store: Store) -> str:
     """The example, submitted and ended with made-up rows; its id."""
-    from sprag.service.jobs.submission import accept
-    from sprag.service.spec.document import parse_spec
+    from sprag_study.service.jobs.submission import accept
+    from sprag_study.service.spec.document import parse_spec
 
     record = accept(store, parse_spec(SPEC))
     rows, epoch = made_up(store.studies.study(record.id)), store.work.take_over("test")

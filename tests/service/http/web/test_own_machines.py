@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from sprag.service.http.views import preset_of
-from sprag.service.http.web.form.live import drawn_machine
-from sprag.service.http.web.form.own_machine import single_machine
-from sprag.service.http.web.form.sent import settle
-from sprag.service.http.web.form.spec import spec_of, values_of
-from sprag.service.spec.document import parse_spec
+from sprag_study.service.http.views import preset_of
+from sprag_study.service.http.web.form.live import drawn_machine
+from sprag_study.service.http.web.form.own_machine import single_machine
+from sprag_study.service.http.web.form.sent import settle
+from sprag_study.service.http.web.form.spec import spec_of, values_of
+from sprag_study.service.spec.document import parse_spec
 from tests.service.http.web.controls import Controls
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from sprag.service.reading.wording import number
-from sprag.worker.models.vocabulary import caption
+from sprag_study.service.reading.wording import number
+from sprag_study.worker.models.vocabulary import caption
 from tests.service.calibrating import calibration
 from tests.service.conftest import Service
 from tests.service.searching import search

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.service.http.web.form.spec import spec_of
-from sprag.service.http.web.rows import pages
-from sprag.service.http.web.rows.asked import rounded_to
-from sprag.service.http.web.rows.view import rows_view
-from sprag.service.reading.reader import Choice
-from sprag.service.reading.wording import number
-from sprag.service.results.fronts import Designs, designs_of
+from sprag_study.service.http.web.form.spec import spec_of
+from sprag_study.service.http.web.rows import pages
+from sprag_study.service.http.web.rows.asked import rounded_to
+from sprag_study.service.http.web.rows.view import rows_view
+from sprag_study.service.reading.reader import Choice
+from sprag_study.service.reading.wording import number
+from sprag_study.service.results.fronts import Designs, designs_of
 from tests.service.conftest import API, Service
 from tests.service.http.web.controls import Controls
 from tests.service.searching import search
@@ -317,7 +317,7 @@ def test_designs_are_ranked_once_for_all_that_shows_them(service: Service, monke
         ranked.append(exact)
         return designs_of(*args, exact=exact)
 
-    monkeypatch.setattr("sprag.service.views.kept.designs_of", rank)
+    monkeypatch.setattr("sprag_study.service.views.kept.designs_of", rank)
     study_id = search(service, rounds=1)
     for page in ("/rows", "/rows?sort=rank", "/rows/search.svg", "/rows/file"):
         assert service.http.get(f"/studies/{study_id}{page}").status_code == 200
@@ -337,7 +337,7 @@ def test_many_rows_are_read_by_another_process(filled: tuple[Service, str], monk
     service, study_id = filled
     text = read(service, f"/studies/{study_id}/rows")
     service.checker.calls.clear()
-    monkeypatch.setattr("sprag.service.http.web.rows.pages.FEW", 10)
+    monkeypatch.setattr("sprag_study.service.http.web.rows.pages.FEW", 10)
     assert read(service, f"/studies/{study_id}/rows") == text
     assert [function.__name__ for function, *_ in service.checker.calls] == ["rows_view"]
     made = rows_view(*service.checker.calls[0][1:])

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Final
 import pytest
 from playwright.sync_api import expect
 
-from sprag.service import languages
-from sprag.service.http.web import script_texts
+from sprag_study.service import languages
+from sprag_study.service.http.web import script_texts
 from tests.acceptance.processes import SECONDS
 
 if TYPE_CHECKING:

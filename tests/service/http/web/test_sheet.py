@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Final
 import pytest
 from playwright.sync_api import expect
 
-from sprag.service.http.views import preset_of
-from sprag.service.http.web.form.page import empty
-from sprag.service.http.web.form.sent import settle
-from sprag.service.http.web.form.sheet import preferred, quantity_of
-from sprag.service.http.web.form.spec import spec_of, values_of
-from sprag.service.spec.document import parse_spec
+from sprag_study.service.http.views import preset_of
+from sprag_study.service.http.web.form.page import empty
+from sprag_study.service.http.web.form.sent import settle
+from sprag_study.service.http.web.form.sheet import preferred, quantity_of
+from sprag_study.service.http.web.form.spec import spec_of, values_of
+from sprag_study.service.spec.document import parse_spec
 from tests.service.http.web.controls import Controls
 from tests.service.http.web.fields import named
 

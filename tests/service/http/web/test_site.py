@@ -14,7 +14,7 @@ import pytest
 from playwright.sync_api import ConsoleMessage, expect
 
 from docs import site as building
-from sprag.service.http.web import pages
+from sprag_study.service.http.web import pages
 from tests.serving import served
 
 if TYPE_CHECKING:

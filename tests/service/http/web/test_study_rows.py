@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import pytest
 from playwright.sync_api import expect
 
-from sprag.service.reading.reader import Choice
-from sprag.service.views import listed as module
+from sprag_study.service.reading.reader import Choice
+from sprag_study.service.views import listed as module
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service

@@ -11,8 +11,8 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import expect
 
-from sprag.worker import models
-from sprag.worker.models import ChunkResult
+from sprag_study.worker import models
+from sprag_study.worker.models import ChunkResult
 from tests.service.calibrating import calibration
 from tests.service.http.web.fields import named
 from tests.service.http.web.test_accessibility import BEYOND, preset, serve
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from playwright.sync_api import Browser, Locator, Page
 
-    from sprag.worker.study import Study
+    from sprag_study.worker.study import Study
     from tests.service.conftest import Service
 
 #: Words that people read: without numbers of figures, choices of lists, and what is closed or hidden.

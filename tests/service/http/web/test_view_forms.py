@@ -11,16 +11,16 @@ from urllib.parse import parse_qsl, urlsplit
 import numpy as np
 import pytest
 
-from sprag.service.http.web.matters import ASKS, OLD
-from sprag.service.http.web.motion import PARTS
-from sprag.service.presets import preset_text
-from sprag.service.spec.document import format_of, load_spec
-from sprag.service.storage.part import SystemClock
-from sprag.service.views import trajectory
-from sprag.service.views.case_questions import CASE_VIEWS
-from sprag.service.views.setting import settings_of
-from sprag.worker.dispatcher import Dispatcher
-from sprag.worker.executors.inline import InlineExecutor
+from sprag_study.service.http.web.matters import ASKS, OLD
+from sprag_study.service.http.web.motion import PARTS
+from sprag_study.service.presets import preset_text
+from sprag_study.service.spec.document import format_of, load_spec
+from sprag_study.service.storage.part import SystemClock
+from sprag_study.service.views import trajectory
+from sprag_study.service.views.case_questions import CASE_VIEWS
+from sprag_study.service.views.setting import settings_of
+from sprag_study.worker.dispatcher import Dispatcher
+from sprag_study.worker.executors.inline import InlineExecutor
 from tests.service.calibrating import calibration
 from tests.service.registered import create_table, registered
 from tests.service.spec_sample import changed
@@ -30,9 +30,9 @@ from tests.service.test_toy_model import SPEC as TOY
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from sprag.service.settings import Settings
-    from sprag.worker.models import Trajectory
-    from sprag.worker.study import Study
+    from sprag_study.service.settings import Settings
+    from sprag_study.worker.models import Trajectory
+    from sprag_study.worker.study import Study
     from tests.service.conftest import Service
 
 SETTLED: dict[str, Any] = changed(

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import pytest
 
-from sprag.sentences import WarningText
-from sprag.service.faults import WarningCode
-from sprag.service.http.views import preset_of
-from sprag.service.languages import language
-from sprag.service.reading.quantities import WORKSHOP
-from sprag.service.reading.reader import Choice
-from sprag.service.report.blocks import Text
-from sprag.service.report.document import document_of
-from sprag.service.spec.document import parse_spec
-from sprag.service.views.library import Library
-from sprag.service.views.study_questions import ReportQuestion
+from sprag_study.sentences import WarningText
+from sprag_study.service.faults import WarningCode
+from sprag_study.service.http.views import preset_of
+from sprag_study.service.languages import language
+from sprag_study.service.reading.quantities import WORKSHOP
+from sprag_study.service.reading.reader import Choice
+from sprag_study.service.report.blocks import Text
+from sprag_study.service.report.document import document_of
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.views.library import Library
+from sprag_study.service.views.study_questions import ReportQuestion
 from tests.service import warning_samples
 from tests.service.timed_spec import SPEC
 

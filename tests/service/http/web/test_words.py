@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from sprag.worker import models
+from sprag_study.worker import models
 from tests.service.figures.seen import seen as picture_of
 
 if TYPE_CHECKING:

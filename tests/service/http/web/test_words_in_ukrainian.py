@@ -6,8 +6,8 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sprag.service.spec.text import load_spec
-from sprag.worker import models
+from sprag_study.service.spec.text import load_spec
+from sprag_study.worker import models
 from tests.service.figures.seen import seen
 
 if TYPE_CHECKING:

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.engine import Ending
-from sprag.engine.catalogue import Parameter, ResultInfo
-from sprag.service.settings import Settings
-from sprag.service.storage.part import SystemClock
-from sprag.worker.dispatcher import Dispatcher
-from sprag.worker.executors.inline import InlineExecutor
-from sprag.worker.models.common import ChunkResult, ChunkTask, KernelShape, chunk_result
-from sprag.worker.models.model import Model
-from sprag.worker.models.presentation import Presentation
-from sprag.worker.study import Study
+from sprag_study.engine import Ending
+from sprag_study.engine.catalogue import Parameter, ResultInfo
+from sprag_study.service.settings import Settings
+from sprag_study.service.storage.part import SystemClock
+from sprag_study.worker.dispatcher import Dispatcher
+from sprag_study.worker.executors.inline import InlineExecutor
+from sprag_study.worker.models.common import ChunkResult, ChunkTask, KernelShape, chunk_result
+from sprag_study.worker.models.model import Model
+from sprag_study.worker.models.presentation import Presentation
+from sprag_study.worker.study import Study
 from tests.service.conftest import Service
 from tests.service.registered import create_table, registered
 

@@ -14,8 +14,8 @@ import httpx
 import pytest
 from anyio.from_thread import BlockingPortal
 
-from sprag.service.cli import study_views
-from sprag.service.client import AsyncClient, Client
+from sprag_study.service.cli import study_views
+from sprag_study.service.client import AsyncClient, Client
 from tests.conftest import Finished
 from tests.service.conftest import PortalTransport, Service
 from tests.service.results.tolerances.conftest import SPEC, finish

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from sprag.service.answers import tolerances as shapes
-from sprag.service.presets import preset_text
-from sprag.service.results.tolerances.batch import Asked
-from sprag.service.results.tolerances.conditions import first_condition
-from sprag.service.results.tolerances.yields import yields
-from sprag.service.spec.document import load_spec, parse_spec
-from sprag.worker import models
+from sprag_study.service.answers import tolerances as shapes
+from sprag_study.service.presets import preset_text
+from sprag_study.service.results.tolerances.batch import Asked
+from sprag_study.service.results.tolerances.conditions import first_condition
+from sprag_study.service.results.tolerances.yields import yields
+from sprag_study.service.spec.document import load_spec, parse_spec
+from sprag_study.worker import models
 from tests.service.conftest import API
 from tests.service.results.tolerances.conftest import DEVIATION, MEAN, SPEC, finish
 from tests.service.shapes import fits

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, binomtest, norm, qmc, quantile_test
 
-from sprag.service.results.tolerances.quantiles import Quantiles, proportion, quantiles, ranks
+from sprag_study.service.results.tolerances.quantiles import Quantiles, proportion, quantiles, ranks
 
 P = (0.05, 0.5, 0.95)
 SEEDS = 500

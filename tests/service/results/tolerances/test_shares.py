@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm, qmc
 
-from sprag.service.results.tolerances import causes
-from sprag.service.results.tolerances.shares import LEAST_DRIVES, Share, shares
-from sprag.service.spec.document import parse_spec
+from sprag_study.service.results.tolerances import causes
+from sprag_study.service.results.tolerances.shares import LEAST_DRIVES, Share, shares
+from sprag_study.service.spec.document import parse_spec
 from tests.service.results.tolerances.conftest import SPEC
 
 

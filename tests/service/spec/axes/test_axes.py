@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sprag.service.spec.axes.values import _steps
-from sprag.service.spec.document import parse_spec
-from sprag.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES
+from sprag_study.service.spec.axes.values import _steps
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES
 from tests.service.spec_sample import SPEC, changed, parsed, problems
 
 PENDULUM = SPEC["base"]["pendulums"][0]

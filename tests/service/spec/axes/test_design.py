@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from sprag.service.reading.units import parse_quantity
-from sprag.service.spec.document import parse_spec
-from sprag.service.spec.draws.unit import LEVELS, unit_sample
-from sprag.service.spec.measured import MeasuredDataError, parse_measured
-from sprag.service.spec.report import SpecError
-from sprag.service.spec.schema.document import spec_schema
-from sprag.worker import models
-from sprag.worker.study import Study
+from sprag_study.service.reading.units import parse_quantity
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.draws.unit import LEVELS, unit_sample
+from sprag_study.service.spec.measured import MeasuredDataError, parse_measured
+from sprag_study.service.spec.report import SpecError
+from sprag_study.service.spec.schema.document import spec_schema
+from sprag_study.worker import models
+from sprag_study.worker.study import Study
 from tests.service.spec_sample import SPEC, changed, parsed, problems
 
 LOAD = {"path": "shaft.load", "values": [0.1, 0.2, 0.3]}
@@ -287,12 +287,12 @@ def test_points_may_have_a_column_for_every_parameter_of_eight_pendulums() -> No
 
 
 def test_more_columns_than_the_limit_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sprag.service.spec.axes.points.MAX_COLUMNS", 20)
+    monkeypatch.setattr("sprag_study.service.spec.axes.points.MAX_COLUMNS", 20)
     with pytest.raises(SpecError) as columns:
         parse_spec(eight(21))
     assert [(fault.where, fault.code) for fault in columns.value.faults] == [("/axes/0/points", "out-of-range")]
-    monkeypatch.setattr("sprag.service.spec.axes.points.MAX_COLUMNS", 256)
-    monkeypatch.setattr("sprag.service.spec.axes.design.MAX_COLUMNS", 20)
+    monkeypatch.setattr("sprag_study.service.spec.axes.points.MAX_COLUMNS", 256)
+    monkeypatch.setattr("sprag_study.service.spec.axes.design.MAX_COLUMNS", 20)
     with pytest.raises(SpecError) as parameters:
         parse_spec(eight(21))
     assert [(fault.where, fault.code) for fault in parameters.value.faults] == [("/axes", "too-many")]

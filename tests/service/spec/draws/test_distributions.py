@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from sprag.service.spec.draws.distributions import Distribution
-from sprag.service.spec.draws.unit import correlated, unit_sample
+from sprag_study.service.spec.draws.distributions import Distribution
+from sprag_study.service.spec.draws.unit import correlated, unit_sample
 
 CENTRE, HALF = 2.0, 0.6
 SIGMA_LOG = math.log(1.0 + HALF / CENTRE) / 3.0

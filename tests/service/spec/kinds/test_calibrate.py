@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
-from sprag.service.jobs.preview import preview_json
-from sprag.service.languages import language
-from sprag.service.reading.faults import fault_text
-from sprag.service.spec.document import ParsedSpec, SpecError, parse_spec
-from sprag.service.spec.schema.document import spec_schema
-from sprag.worker.chunking import Chunking
+from sprag_study.service.jobs.preview import preview_json
+from sprag_study.service.languages import language
+from sprag_study.service.reading.faults import fault_text
+from sprag_study.service.spec.document import ParsedSpec, SpecError, parse_spec
+from sprag_study.service.spec.schema.document import spec_schema
+from sprag_study.worker.chunking import Chunking
 from tests.service.spec_sample import SPEC
 
 CSV = """shaft.load [N*mm],excitation.frequency [Hz],shaft.speed.mean [rpm],sigma

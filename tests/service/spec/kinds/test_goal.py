@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from sprag.service.spec.kinds.goal import read_goal, read_points, read_variables
-from sprag.service.spec.machine.registry import part_of
-from sprag.service.spec.node import Node
-from sprag.service.spec.report import Report
-from sprag.worker import models
+from sprag_study.service.spec.kinds.goal import read_goal, read_points, read_variables
+from sprag_study.service.spec.machine.registry import part_of
+from sprag_study.service.spec.node import Node
+from sprag_study.service.spec.report import Report
+from sprag_study.worker import models
 from tests.service.spec_sample import SPEC, parsed
 
 GOAL: dict[str, Any] = {

@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.service.http.web.form.fields import refine_fields
-from sprag.service.jobs.preview import preview_json
-from sprag.service.languages import language
-from sprag.service.reading.faults import fault_text
-from sprag.service.spec.extend import parse_extended
-from sprag.service.spec.kinds.refine import REFINE as RECORD
-from sprag.service.spec.longer import longer_spec
-from sprag.service.spec.report import SpecError
-from sprag.worker.chunking import Chunking
-from sprag.worker.planning import most_cases, planner_of
-from sprag.worker.study import Study
+from sprag_study.service.http.web.form.fields import refine_fields
+from sprag_study.service.jobs.preview import preview_json
+from sprag_study.service.languages import language
+from sprag_study.service.reading.faults import fault_text
+from sprag_study.service.spec.extend import parse_extended
+from sprag_study.service.spec.kinds.refine import REFINE as RECORD
+from sprag_study.service.spec.longer import longer_spec
+from sprag_study.service.spec.report import SpecError
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.planning import most_cases, planner_of
+from sprag_study.worker.study import Study
 from tests.service.spec_sample import changed, parsed, problems
 
 AXES = [

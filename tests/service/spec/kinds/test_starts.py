@@ -8,10 +8,10 @@ from typing import Any
 import jsonschema
 import pytest
 
-from sprag.service.spec.document import SpecError, parse_spec
-from sprag.service.spec.schema.document import spec_schema
-from sprag.worker import models
-from sprag.worker.models.starts import at_start
+from sprag_study.service.spec.document import SpecError, parse_spec
+from sprag_study.service.spec.schema.document import spec_schema
+from sprag_study.worker import models
+from sprag_study.worker.models.starts import at_start
 from tests.service.spec_sample import SPEC, changed
 
 SPEED, ANGLE = "shaft.initial_speed", "pendulums.0.initial_angle"

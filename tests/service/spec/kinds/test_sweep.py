@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from sprag.service.spec.design import design_spec
-from sprag.service.spec.document import SpecError, parse_spec
-from sprag.service.spec.extend import parse_extended
-from sprag.service.spec.longer import longer_spec
+from sprag_study.service.spec.design import design_spec
+from sprag_study.service.spec.document import SpecError, parse_spec
+from sprag_study.service.spec.extend import parse_extended
+from sprag_study.service.spec.longer import longer_spec
 from tests.service.spec_sample import changed, parsed, schema
 
 AXIS: dict[str, Any] = {"path": "excitation.frequency", "linspace": ["16 Hz", "35 Hz", 5]}
@@ -58,8 +58,8 @@ def test_what_cannot_be_swept_is_refused(changes: dict[str, Any], where: str, co
 
 
 def test_a_machine_shaft_has_no_sweep() -> None:
-    from sprag.service.presets import preset_text
-    from sprag.service.spec.text import load_spec
+    from sprag_study.service.presets import preset_text
+    from sprag_study.service.spec.text import load_spec
 
     press = load_spec(preset_text("press")[1], "toml")
     assert isinstance(press, dict)

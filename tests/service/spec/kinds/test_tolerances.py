@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag.service.spec.document import parse_spec
-from sprag.service.spec.extend import parse_extended
-from sprag.service.spec.longer import longer_spec
-from sprag.worker.models.parameters import in_range, parameter_of
-from sprag.worker.spread import DRIVE, Spread
-from sprag.worker.study import Study, without_drives
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.extend import parse_extended
+from sprag_study.service.spec.longer import longer_spec
+from sprag_study.worker.models.parameters import in_range, parameter_of
+from sprag_study.worker.spread import DRIVE, Spread
+from sprag_study.worker.study import Study, without_drives
 from tests.service.spec_sample import changed, parsed, problems, schema
 
 LOADS = [{"path": "shaft.load", "values": [0.05, 0.1, 0.2]}]

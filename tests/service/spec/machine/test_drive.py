@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from sprag.worker.limits import MAX_CLUTCH_ROWS
-from sprag.worker.models import MAX_COEFFICIENTS, MAX_PENDULUMS, parameter_catalogue
+from sprag_study.worker.limits import MAX_CLUTCH_ROWS
+from sprag_study.worker.models import MAX_COEFFICIENTS, MAX_PENDULUMS, parameter_catalogue
 from tests.service.spec_sample import SPEC, parsed, problems
 
 PENDULUM = SPEC["base"]["pendulums"][0]

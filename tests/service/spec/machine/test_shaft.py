@@ -11,12 +11,12 @@ from typing import Any
 import jsonschema
 import pytest
 
-from sprag.service.faults import Fault, warned
-from sprag.service.presets import preset_names, preset_text
-from sprag.service.spec.document import SpecError, format_of, load_spec, parse_spec
-from sprag.service.spec.schema.document import spec_schema
-from sprag.worker.models import parameters_of
-from sprag.worker.study import Study
+from sprag_study.service.faults import Fault, warned
+from sprag_study.service.presets import preset_names, preset_text
+from sprag_study.service.spec.document import SpecError, format_of, load_spec, parse_spec
+from sprag_study.service.spec.schema.document import spec_schema
+from sprag_study.worker.models import parameters_of
+from sprag_study.worker.study import Study
 
 PRESS: dict[str, Any] = tomllib.loads(
     (Path(__file__).resolve().parents[4] / "examples" / "press.toml").read_text(encoding="utf-8")

@@ -7,9 +7,9 @@ from typing import Any
 import jsonschema
 import pytest
 
-from sprag.service.spec.document import parse_spec
-from sprag.service.spec.machine.registry import part_of
-from sprag.service.spec.schema.document import spec_schema
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.machine.registry import part_of
+from sprag_study.service.spec.schema.document import spec_schema
 from tests.service.spec.machine.test_shaft import changed, problems
 
 STAGES: list[dict[str, Any]] = [

@@ -9,9 +9,9 @@ from typing import Any
 import jsonschema
 import pytest
 
-from sprag.service.faults import warned
-from sprag.service.spec.document import parse_spec
-from sprag.service.spec.schema.document import spec_schema
+from sprag_study.service.faults import warned
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.schema.document import spec_schema
 from tests.service.spec.machine.test_shaft import GAS, PRESS, changed, problems, study
 
 

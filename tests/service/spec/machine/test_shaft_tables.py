@@ -8,11 +8,11 @@ from typing import Any
 import jsonschema
 import pytest
 
-from sprag.service.spec.document import parse_spec
-from sprag.service.spec.machine.registry import part_of
-from sprag.service.spec.report import SpecError
-from sprag.service.spec.schema.document import spec_schema
-from sprag.worker import models
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.machine.registry import part_of
+from sprag_study.service.spec.report import SpecError
+from sprag_study.service.spec.schema.document import spec_schema
+from sprag_study.worker import models
 from tests.service.spec.machine.test_shaft import changed, problems
 
 TORQUE = "angle [deg];torque [kN*m]\n0;0,1\n90;0,3\n360;0,1\n"

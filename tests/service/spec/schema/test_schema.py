@@ -9,14 +9,14 @@ from typing import Any
 import jsonschema
 import pytest
 
-from sprag.service.spec.axes.axes import AXIS
-from sprag.service.spec.described import schema_of
-from sprag.service.spec.document import SpecError, format_of, load_spec, parse_spec
-from sprag.service.spec.machine.clutch import CLUTCH
-from sprag.service.spec.machine.registry import part_of
-from sprag.service.spec.run import RUN
-from sprag.service.spec.schema.document import spec_schema
-from sprag.worker.models import model_names, parameter_catalogue
+from sprag_study.service.spec.axes.axes import AXIS
+from sprag_study.service.spec.described import schema_of
+from sprag_study.service.spec.document import SpecError, format_of, load_spec, parse_spec
+from sprag_study.service.spec.machine.clutch import CLUTCH
+from sprag_study.service.spec.machine.registry import part_of
+from sprag_study.service.spec.run import RUN
+from sprag_study.service.spec.schema.document import spec_schema
+from sprag_study.worker.models import model_names, parameter_catalogue
 from tests.service.spec_sample import SPEC, changed
 
 

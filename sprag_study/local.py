@@ -9,15 +9,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag.here import Here
-from sprag.service.client.queries import spec_of
-from sprag.service.client.synchronous.study import Study
-from sprag.service.jobs.local import opened, pool_size, run_stored
-from sprag.service.plain_data import plain
-from sprag.service.settings import Settings
-from sprag.service.spec.document import SpecError, parse_spec
-from sprag.worker.chunking import Chunking
-from sprag.worker.ports import StoreError
+from sprag_study.here import Here
+from sprag_study.service.client.queries import spec_of
+from sprag_study.service.client.synchronous.study import Study
+from sprag_study.service.jobs.local import opened, pool_size, run_stored
+from sprag_study.service.plain_data import plain
+from sprag_study.service.settings import Settings
+from sprag_study.service.spec.document import SpecError, parse_spec
+from sprag_study.worker.chunking import Chunking
+from sprag_study.worker.ports import StoreError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
 
-    from sprag.service.client.queries import Spec
-    from sprag.service.storage.studies.records import Progress, StudyRecord
+    from sprag_study.service.client.queries import Spec
+    from sprag_study.service.storage.studies.records import Progress, StudyRecord
 
 #: How other libraries ask an object for its table.
 _AS_TABLE: Final = ("__dataframe__", "__arrow_c_stream__")

@@ -14,9 +14,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-import sprag
-from sprag.engine.vibration_drive.simulate import simulate as plain_simulate
-from sprag.service.http.views import preset_of
+import sprag_study as sprag
+from sprag_study.engine.vibration_drive.simulate import simulate as plain_simulate
+from sprag_study.service.http.views import preset_of
 from tests.engine.vibration_drive.drive import drive, periods
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -110,7 +110,7 @@ def test_a_study_of_a_file_and_a_database(tmp_path: Path) -> None:
 
 
 def test_what_is_wrong_with_a_study_is_named() -> None:
-    from sprag.service.spec.report import SpecError
+    from sprag_study.service.spec.report import SpecError
 
     with pytest.raises(SpecError) as refused:
         sprag.run(SPEC | {"base": SPEC["base"] | {"shaft": {"inertia": -1.0}}})
@@ -177,7 +177,7 @@ def test_the_client_is_there_without_the_rest() -> None:
 import sys
 for name in ("numpy", "pandas", "numba", "sqlalchemy", "fastapi", "pyarrow", "pydantic"):
     sys.modules[name] = None
-import sprag
+import sprag_study as sprag
 sprag.Client, sprag.AsyncClient, sprag.RefusedError, sprag.__version__
 for ask in (lambda: sprag.run, lambda: sprag.simulate):
     try:
@@ -188,8 +188,8 @@ for ask in (lambda: sprag.run, lambda: sprag.simulate):
     done = python("-c", program)
     assert done.returncode == 0, done.stderr
     first, second = done.stdout.splitlines()
-    assert re.fullmatch(r"sprag\.run needs the package '\w+': pip install \"sprag\[server\]\"", first)
-    assert re.fullmatch(r"sprag\.simulate needs the package '\w+': pip install \"sprag\[server\]\"", second)
+    assert re.fullmatch(r"sprag\.run needs the package '\w+': pip install \"sprag-study\[server\]\"", first)
+    assert re.fullmatch(r"sprag\.simulate needs the package '\w+': pip install \"sprag-study\[server\]\"", second)
 
 
 #: As if only what the base installation has were there.
@@ -216,15 +216,15 @@ for name in ("numpy", "pandas", "xarray", "numba", "sqlalchemy", "fastapi", "pyd
 )
 def test_commands_for_a_running_service_need_no_extra(command: list[str]) -> None:
     arguments = [*command, "--server", "http://127.0.0.1:9"]
-    done = python("-c", f"{BASE_ONLY}\nsys.argv[1:] = {arguments}\nfrom sprag.service.cli import main\nmain()")
+    done = python("-c", f"{BASE_ONLY}\nsys.argv[1:] = {arguments}\nfrom sprag_study.service.cli import main\nmain()")
     assert (done.returncode, "No Sprag service at http://127.0.0.1:9" in done.stderr) == (3, True), done.stderr
 
 
 def test_answers_are_shown_without_an_extra() -> None:
     program = """
-from sprag.service.cli.console import OK
-from sprag.service.cli.shown import show_curves
-from sprag.service.cli.remote import show_study
+from sprag_study.service.cli.console import OK
+from sprag_study.service.cli.shown import show_curves
+from sprag_study.service.cli.remote import show_study
 progress = {"done": 2, "total": 2, "ok": 1, "endings": {OK: 1, "chatter": 1}}
 about = {"id": "st_1", "name": "one", "model": "m", "state": "finished", "time_over": False}
 show_study({**about, "progress": progress}, False)
@@ -239,8 +239,8 @@ show_curves({"x": {"path": "shaft.load", "unit": "N*m"}, "results": results, "un
 
 
 def test_the_name_of_the_good_ending_is_that_of_the_models() -> None:
-    from sprag.service.cli.console import OK
-    from sprag.worker import models
+    from sprag_study.service.cli.console import OK
+    from sprag_study.worker import models
 
     assert OK == models.OK
 
@@ -249,8 +249,8 @@ def test_tables_name_the_extra_that_they_need() -> None:
     program = """
 import sys
 sys.modules["pandas"] = sys.modules["xarray"] = None
-import sprag
-from sprag.service.client.frames import grid_of, table_of
+import sprag_study as sprag
+from sprag_study.service.client.frames import grid_of, table_of
 data = {"x": {"path": "x"}, "curves": [], "results": {}, "units": {}}
 for ask in (lambda: table_of(b""), lambda: grid_of(b""), sprag.Curves(data).to_pandas, sprag.Curves(data).to_xarray):
     try:
@@ -259,23 +259,25 @@ for ask in (lambda: table_of(b""), lambda: grid_of(b""), sprag.Curves(data).to_p
         print(error)
 """
     done = python("-c", program)
-    assert done.stdout.count('pip install "sprag[tables]"') == 4, done.stderr
+    assert done.stdout.count('pip install "sprag-study[tables]"') == 4, done.stderr
 
 
 def test_a_command_names_the_extra_that_it_needs() -> None:
     blocked = "import sys; sys.modules.update(dict.fromkeys(['numpy', 'sqlalchemy', 'pydantic_settings', 'pydantic']))"
-    command = f"{blocked}; sys.argv[1:] = ['run', 'examples/press.toml']; from sprag.service.cli import main; main()"
+    command = (
+        f"{blocked}; sys.argv[1:] = ['run', 'examples/press.toml']; from sprag_study.service.cli import main; main()"
+    )
     done = python("-c", command)
     assert done.returncode == 3
-    assert 'pip install "sprag[server]"' in done.stderr
+    assert 'pip install "sprag-study[server]"' in done.stderr
 
 
 def test_the_module_is_the_command_line_whatever_lies_in_the_folder(tmp_path: Path) -> None:
     (tmp_path / "worker.py").write_text("raise SystemExit('the wrong worker')")
     (tmp_path / "service").mkdir()
     (tmp_path / "service" / "__init__.py").write_text("raise SystemExit('the wrong service')")
-    done = python("-m", "sprag", "--version", cwd=tmp_path)
-    assert (done.returncode, done.stdout) == (0, f"sprag {version('sprag')}\n"), done.stderr
+    done = python("-m", "sprag_study", "--version", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (0, f"sprag {version('sprag-study')}\n"), done.stderr
 
 
 def test_a_wrong_spec_is_one_error_here_and_of_a_service() -> None:

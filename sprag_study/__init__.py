@@ -1,8 +1,8 @@
 """Sprag as a library: a running service, studies run here, the engine (docs/python.md).
 
-    import sprag
+    import sprag_study as sprag
 
-    study = sprag.run("study.toml")  # run here; needs sprag[server]
+    study = sprag.run("study.toml")  # run here; needs sprag-study[server]
     with sprag.Client("http://sprag.example:8000") as client:  # the base installation
         study = client.submit("study.toml").wait()  # the same study, with the same methods
 
@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
-    from sprag import engine
-    from sprag.frames import simulate
-    from sprag.local import run
-    from sprag.service.client import (
+    from sprag_study import engine
+    from sprag_study.frames import simulate
+    from sprag_study.local import run
+    from sprag_study.service.client import (
         AsyncClient,
         AsyncStudy,
         Client,
@@ -32,10 +32,10 @@ if TYPE_CHECKING:
         preset,
         with_units,
     )
-    from sprag.service.extras import MissingExtraError
-    from sprag.service.spec.report import SpecError
-    from sprag.worker.errors import SpragError
-    from sprag.worker.ports import ExecutorError, StoreError
+    from sprag_study.service.extras import MissingExtraError
+    from sprag_study.service.spec.report import SpecError
+    from sprag_study.worker.errors import SpragError
+    from sprag_study.worker.ports import ExecutorError, StoreError
 
     __version__: str
 
@@ -56,11 +56,11 @@ _OF_CLIENT: Final = (
 )
 #: Errors that need nothing but the base installation, and their modules.
 _ERRORS: Final = {
-    "ExecutorError": "sprag.worker.ports",
-    "MissingExtraError": "sprag.service.extras",
-    "SpecError": "sprag.service.spec.report",
-    "SpragError": "sprag.worker.errors",
-    "StoreError": "sprag.worker.ports",
+    "ExecutorError": "sprag_study.worker.ports",
+    "MissingExtraError": "sprag_study.service.extras",
+    "SpecError": "sprag_study.service.spec.report",
+    "SpragError": "sprag_study.worker.errors",
+    "StoreError": "sprag_study.worker.ports",
 }
 __all__ = [
     "AsyncClient",
@@ -102,20 +102,20 @@ def __getattr__(name: str) -> Any:
     if name == "__version__":
         from importlib.metadata import version
 
-        return version("sprag")
+        return version("sprag-study")
     if name in _OF_CLIENT:
-        return getattr(import_module("sprag.service.client"), name)
+        return getattr(import_module("sprag_study.service.client"), name)
     if name in _ERRORS:
         return getattr(import_module(_ERRORS[name]), name)
-    extras = import_module("sprag.service.extras")
+    extras = import_module("sprag_study.service.extras")
     if name == "engine":
-        return import_module("sprag.engine")
+        return import_module("sprag_study.engine")
     with extras.naming_extra(f"sprag.{name}"):
         if name == "run":
-            return import_module("sprag.local").run
+            return import_module("sprag_study.local").run
         if name == "simulate":
-            return import_module("sprag.frames").simulate
-    raise AttributeError(f"module 'sprag' has no attribute {name!r}")
+            return import_module("sprag_study.frames").simulate
+    raise AttributeError(f"module 'sprag_study' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

@@ -2,8 +2,8 @@
 
 A `Sentence` is an English string for programs, files and logs. It keeps the text of the catalogue that it was made of,
 with the values that stand in it, and has a form as JSON data, so that it can be stored. Who knows a reader
-(`sprag.service.reading.reader`) says it in his language. The engine warns and the worker gives reasons in sentences;
-neither knows a language, so this module stands below both.
+(`sprag_study.service.reading.reader`) says it in his language. The engine warns and the worker gives reasons in
+sentences; neither knows a language, so this module stands below both.
 """
 
 from __future__ import annotations

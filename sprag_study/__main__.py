@@ -1,4 +1,4 @@
-"""``python -m sprag``: the command line, independent of the files in the current folder."""
+"""``python -m sprag_study``: the command line, independent of the files in the current folder."""
 
 import os
 import sys
@@ -14,6 +14,6 @@ def _leave_folder_out() -> None:
 
 if __name__ == "__main__":
     _leave_folder_out()
-    from sprag.service.cli import main
+    from sprag_study.service.cli import main
 
     main()

@@ -1,6 +1,6 @@
 """The engine for notebooks: parameters as arrays or a frame in, characteristics as a frame with units out.
 
-from sprag.frames import simulate
+from sprag_study.frames import simulate
 
 results = simulate({"excitation.frequency": [20.0, 25.0], ...})
 results["shaft.speed.mean"], results.attrs["units"]["shaft.speed.mean"]  # rad/s
@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import pandas as pd
 
-from sprag.engine import ENGINE_VERSION, Ending, Run, Span
-from sprag.engine.catalogue import Parameter, ResultInfo
-from sprag.engine.endings import ENDINGS
-from sprag.engine.vibration_drive import simulate as _vibration_drive
-from sprag.engine.vibration_drive.cases import pendulum_count
-from sprag.engine.vibration_drive.parameters import PARAMETERS
-from sprag.engine.vibration_drive.results import result_infos
+from sprag_study.engine import ENGINE_VERSION, Ending, Run, Span
+from sprag_study.engine.catalogue import Parameter, ResultInfo
+from sprag_study.engine.endings import ENDINGS
+from sprag_study.engine.vibration_drive import simulate as _vibration_drive
+from sprag_study.engine.vibration_drive.cases import pendulum_count
+from sprag_study.engine.vibration_drive.parameters import PARAMETERS
+from sprag_study.engine.vibration_drive.results import result_infos
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -106,8 +106,8 @@ def _of_model(
     model: str, base: Mapping[str, Any], columns: Mapping[str, np.ndarray], count: int, index: pd.Index | None
 ) -> pd.DataFrame:
     """Cases of any model, as those of a study of them."""
-    from sprag.service.spec.document import parse_spec
-    from sprag.worker import models
+    from sprag_study.service.spec.document import parse_spec
+    from sprag_study.worker import models
 
     axes = [{"path": path, "values": np.broadcast_to(values, count).tolist()} for path, values in columns.items()]
     study = parse_spec({"sprag": 1, "model": model, "base": base, "axes": axes, "combine": "zip"}).study

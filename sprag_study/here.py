@@ -9,39 +9,39 @@ from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final, TypeVar, cast
 
-from sprag.service import languages
-from sprag.service.client.errors import RefusedError
-from sprag.service.client.events import StudyEvent
-from sprag.service.client.synchronous.connection import Connection
-from sprag.service.client.wire import plain_body
-from sprag.service.faults import FaultError, choice_of, parameter_error
-from sprag.service.figures.pictures import PICTURES
-from sprag.service.formats import FORMATS, HEADERS
-from sprag.service.http.problems import PROBLEM_TYPES, problem_json
-from sprag.service.http.views import case_detail, whole_detail
-from sprag.service.jobs import checks
-from sprag.service.jobs.submission import take_in
-from sprag.service.json_text import to_bytes
-from sprag.service.reading.limits import span
-from sprag.service.reading.numbers import whole_number
-from sprag.service.reading.quantities import SI
-from sprag.service.reading.reader import CAPTIONS, Choice
-from sprag.service.report import REPORT_FORMATS, Office, report_file
-from sprag.service.results.rounds import round_json
-from sprag.service.results.start_states import check_start
-from sprag.service.storage.errors import StoreError
-from sprag.service.views import row_files
-from sprag.service.views.case_pages import case_page, page_json, wanted
-from sprag.service.views.case_view import drawn, see, written
-from sprag.service.views.cases import CASE_VIEWS
-from sprag.service.views.curves import pairs
-from sprag.service.views.explore import selection
-from sprag.service.views.library import Library
-from sprag.service.views.queries import asked
-from sprag.service.views.studies import STUDY_VIEWS
-from sprag.service.views.study_questions import CasesQuestion, ReportQuestion, SelectQuestion
-from sprag.service.views.study_view import study_file
-from sprag.worker.limits import (
+from sprag_study.service import languages
+from sprag_study.service.client.errors import RefusedError
+from sprag_study.service.client.events import StudyEvent
+from sprag_study.service.client.synchronous.connection import Connection
+from sprag_study.service.client.wire import plain_body
+from sprag_study.service.faults import FaultError, choice_of, parameter_error
+from sprag_study.service.figures.pictures import PICTURES
+from sprag_study.service.formats import FORMATS, HEADERS
+from sprag_study.service.http.problems import PROBLEM_TYPES, problem_json
+from sprag_study.service.http.views import case_detail, whole_detail
+from sprag_study.service.jobs import checks
+from sprag_study.service.jobs.submission import take_in
+from sprag_study.service.json_text import to_bytes
+from sprag_study.service.reading.limits import span
+from sprag_study.service.reading.numbers import whole_number
+from sprag_study.service.reading.quantities import SI
+from sprag_study.service.reading.reader import CAPTIONS, Choice
+from sprag_study.service.report import REPORT_FORMATS, Office, report_file
+from sprag_study.service.results.rounds import round_json
+from sprag_study.service.results.start_states import check_start
+from sprag_study.service.storage.errors import StoreError
+from sprag_study.service.views import row_files
+from sprag_study.service.views.case_pages import case_page, page_json, wanted
+from sprag_study.service.views.case_view import drawn, see, written
+from sprag_study.service.views.cases import CASE_VIEWS
+from sprag_study.service.views.curves import pairs
+from sprag_study.service.views.explore import selection
+from sprag_study.service.views.library import Library
+from sprag_study.service.views.queries import asked
+from sprag_study.service.views.studies import STUDY_VIEWS
+from sprag_study.service.views.study_questions import CasesQuestion, ReportQuestion, SelectQuestion
+from sprag_study.service.views.study_view import study_file
+from sprag_study.worker.limits import (
     MAX_NARROW_STEPS,
     MAX_SETTLED_PERIODS,
     MAX_STARTS,
@@ -49,16 +49,16 @@ from sprag.worker.limits import (
     MIN_SETTLED_PERIODS,
     NARROW_STEPS,
 )
-from sprag.worker.states import TransitionError
+from sprag_study.worker.states import TransitionError
 
 if TYPE_CHECKING:
-    from sprag.service.client.wire import Query
-    from sprag.service.faults import Kind
-    from sprag.service.jobs.submission import Submission
-    from sprag.service.settings import Settings
-    from sprag.service.storage.store import Store
-    from sprag.service.storage.studies.records import StudyRecord
-    from sprag.worker.study import Study
+    from sprag_study.service.client.wire import Query
+    from sprag_study.service.faults import Kind
+    from sprag_study.service.jobs.submission import Submission
+    from sprag_study.service.settings import Settings
+    from sprag_study.service.storage.store import Store
+    from sprag_study.service.storage.studies.records import StudyRecord
+    from sprag_study.worker.study import Study
 
 View = TypeVar("View")
 
