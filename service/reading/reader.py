@@ -23,7 +23,7 @@ from sprag_study.service.reading.quantities import KINDS, SI, Units, units_for
 from sprag_study.service.reading.units import has_unit
 from sprag_study.service.reading.wording import number, unit_text
 from sprag_study.worker.models.registry import model_of
-from sprag_study.worker.models.vocabulary import caption, has_caption, letter
+from sprag_study.worker.models.vocabulary import caption, has_caption, letter, single_parts
 
 if TYPE_CHECKING:
     from sprag_study.worker.study import Study
@@ -173,12 +173,14 @@ class Reading:
     model: str
     units: Units = field(default_factory=Units)
     names: str = CAPTIONS
+    #: The numbered parts of which the machine has only one, which are not named.
+    single: frozenset[str] = frozenset()
 
     def caption(self, name: str) -> str:
         """What a path, a result or a variable is called; of tied paths ("a = b") each."""
         if self.names == CODES:
             return name
-        first, *tied = (caption(self.model, part, gettext) for part in name.split(" = "))
+        first, *tied = (caption(self.model, part, gettext, self.single) for part in name.split(" = "))
         return " = ".join([first, *map(lower_first, tied)])
 
     def within(self, name: str) -> str:
@@ -258,7 +260,7 @@ CLUTCH: Final = Reading("vibration-drive")
 
 def reading_for(study: Study, spec: Mapping[str, Any], choice: Choice) -> Reading:
     """The reading of a choice; raises SelectionError for units that cannot be shown."""
-    return Reading(study.model, units_for(study, spec, choice.units), choice.names)
+    return Reading(study.model, units_for(study, spec, choice.units), choice.names, single_parts(study.base))
 
 
 # Sentences that earlier releases stored in English only: what they say is found in them again, for one release.

@@ -11,12 +11,13 @@ import pytest
 
 from sprag_study.service.reading.reader import Choice, Reading
 from sprag_study.service.results.defaults import usual_value
-from sprag_study.service.results.headlines.headline import KeyNumber, short_titles
+from sprag_study.service.results.headlines.headline import KeyNumber
 from sprag_study.service.spec.document import parse_spec
 from sprag_study.service.views.headline import Headline, headline_of, is_small
 from sprag_study.service.views.library import Library, reading_of
 from sprag_study.worker import models
 from sprag_study.worker.models import ChunkResult
+from sprag_study.worker.models.vocabulary import single_parts
 from sprag_study.worker.study import Study
 from tests.service.calibrating import DAMPING, calibration
 from tests.service.conftest import Service
@@ -110,7 +111,7 @@ def test_a_calibration_shows_its_values_with_intervals(service: Service) -> None
     assert damping.low is not None
     assert damping.high is not None
     assert damping.low < DAMPING < damping.high
-    assert damping.title(reading) == "Damping, pendulum 0"
+    assert damping.title(reading) == "Damping"
     assert reading.say(damping.note) == "0.01 N·m·s/rad before"
     assert damping.number(reading) in headline.said(reading)
     assert inertia.interval(reading) in reading.say(inertia.where)
@@ -165,7 +166,7 @@ def test_what_a_curve_is_held_at_is_told(service: Service) -> None:
     ]
     headline, reading = found(service, run(service, {**plain, "axes": axes}))
     assert "26 Hz" in reading.say(headline.of)
-    assert "arm of the mass, pendulum 0 = 0.03 m" in reading.say(headline.of)
+    assert "arm of the mass = 0.03 m" in reading.say(headline.of)
 
 
 def test_of_an_axis_around_the_base_the_nearest_place_is_meant_everywhere(service: Service) -> None:
@@ -213,10 +214,11 @@ def test_a_study_all_of_whose_cases_failed_says_how(service: Service) -> None:
     assert headline.said(reading).endswith(" cases has a result: chatter.")
 
 
-def test_titles_leave_out_the_part_of_a_machine_where_they_differ_without_it() -> None:
-    reading = Reading("vibration-drive")
-    first, second, arm = (KeyNumber(name, 31.5) for name in
-                          ("pendulums.0.spring_rate", "pendulums.1.spring_rate", "pendulums.0.arm"))  # fmt: skip
-    assert short_titles([first, arm], reading) == ["Spring rate", "Arm of the mass"]
-    assert short_titles([first, second], reading) == ["Spring rate, pendulum 0", "Spring rate, pendulum 1"]
+def test_the_only_pendulum_of_a_machine_is_not_named() -> None:
+    paths = ["pendulums.0.arm", "pendulums.0.spring_rate", "shaft.load"]
+    reading = Reading("vibration-drive", single=single_parts(paths))
+    assert KeyNumber("pendulums.0.spring_rate", 31.5).title(reading) == "Spring rate"
+    assert reading.caption("pendulums.0.power.loss") == reading.caption("power.loss.mean") + ", pendulum 0"
+    several = Reading("vibration-drive", single=single_parts([*paths, "pendulums.1.arm"]))
+    assert several.caption("pendulums.0.spring_rate") == "Spring rate, pendulum 0"
     assert reading.letter("shaft.irregularity") == "<i>δ</i><sub>ω</sub>"  # δ is the backlash in drawings

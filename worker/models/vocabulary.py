@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterable
 from functools import lru_cache
 from typing import Final
 
@@ -30,16 +30,35 @@ def words(name: str) -> str:
     return text[:1].upper() + text[1:] if text[:1].isascii() else text
 
 
-def caption(model: str, name: str, translate: Callable[[str], str] = str) -> str:
+def caption(model: str, name: str, translate: Callable[[str], str] = str, single: Collection[str] = ()) -> str:
     """The caption of a path of a spec, a result or a variable of ``model``: ``Spring rate, pendulum 0``.
 
     Without one of its own, a parameter has the beginning of its description, anything else its name in words.
-    ``translate`` gives each text of `caption_texts` in another language.
+    ``translate`` gives each text of `caption_texts` in another language. ``single`` are the numbered parts of which
+    the machine has only one (`single_parts`): they stand only where something of no part is called the same.
     """
     if name.endswith(_HALF_WIDTH):
-        return translate(HALF_WIDTH).format(caption=caption(model, name.removesuffix(_HALF_WIDTH), translate))
+        return translate(HALF_WIDTH).format(caption=caption(model, name.removesuffix(_HALF_WIDTH), translate, single))
     text, index, part = _caption(model, name)
+    if part and part[1] == "0" and part[0] in single and text not in _without_part(model):
+        part = None
     return translate(text).format(index) + (f", {translate(part[0])} {part[1]}" if part else "")
+
+
+def bare_caption(model: str, name: str, translate: Callable[[str], str] = str) -> str:
+    """The caption without its part of the machine, for places that stand within that part: ``Spring rate``."""
+    text, index, _part = _caption(model, name)
+    return translate(text).format(index)
+
+
+def single_parts(paths: Iterable[str]) -> frozenset[str]:
+    """The kinds of numbered parts, pendulums and parts of a machine, of which these paths have just one."""
+    numbers = {
+        (word, name.removeprefix(f"{first}.").partition(".")[0])
+        for name in paths for first, word in _PARTS[:2] if name.startswith(f"{first}.")
+    }  # fmt: skip
+    kinds = [word for word, _number in numbers]
+    return frozenset(word for word in kinds if kinds.count(word) == 1)
 
 
 def has_caption(model: str, name: str) -> bool:
@@ -63,6 +82,15 @@ def _caption(model: str, name: str) -> tuple[str, str, tuple[str, str] | None]:
         return _without_places(words(own if part else name)), "", part
     text = _END.split(entry.help, maxsplit=1)[0].strip()
     return _without_places(text[:1].upper() + text[1:]), "", part
+
+
+@lru_cache(maxsize=16)
+def _without_part(model: str) -> frozenset[str]:
+    """The texts of captions of what belongs to no numbered part."""
+    known = model_of(model)
+    names = [*(entry.path for entry in known.parameters()), *(info.name for info in known.result_catalogue())]
+    parts = tuple(f"{first}." for first, _word in _PARTS)
+    return frozenset(_caption(model, name)[0] for name in names if not name.startswith(parts))
 
 
 def _without_places(text: str) -> str:

@@ -33,7 +33,6 @@ from sprag_study.service.http.work import Attended
 from sprag_study.service.languages import N_, _
 from sprag_study.service.presets import preset_names
 from sprag_study.service.reading.faults import message
-from sprag_study.service.results.headlines.headline import short_titles
 from sprag_study.service.spec.labels import StudyChange, read_change, tags_of
 from sprag_study.service.spec.report import SpecError
 from sprag_study.service.storage.errors import ChangedMeanwhileError, StoreError
@@ -145,8 +144,7 @@ def _row(record: StudyRecord, told: Listed | None) -> dict[str, Any]:
         "spark": Markup(drawn),  # noqa: S704 - numbers alone
         "about": reading.say(told.about),
         "answers": [
-            (one.number(reading), one.unit_text(reading), title, reading.say(one.where))
-            for one, title in zip(numbers, short_titles(numbers, reading), strict=True)
+            (one.number(reading), one.unit_text(reading), one.title(reading), reading.say(one.where)) for one in numbers
         ],
     }
 

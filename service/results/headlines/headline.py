@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -179,17 +178,6 @@ def digits(value: float, half_width: float | None = None) -> int:
 def amount(info: ResultInfo, value: float, half_width: float | None = None) -> Amount:
     """A result for a sentence."""
     return Amount(value, info.unit, digits(value, half_width))
-
-
-def short_titles(numbers: Sequence[KeyNumber], reading: Reading) -> list[str]:
-    """The titles of numbers, without the part of the machine where they differ without it."""
-    return short_captions([one.title(reading) for one in numbers])
-
-
-def short_captions(titles: Sequence[str]) -> list[str]:
-    """Captions without the part of the machine where they differ without it."""
-    short = [re.sub(r", [^,]*\d+$", "", title) for title in titles]
-    return short if len(set(short)) == len(short) else list(titles)
 
 
 def trace_of(x: Sequence[float], y: NDArray[np.float64], at: int | None = None) -> Trace | None:

@@ -98,7 +98,7 @@ PRESENTATION: Final = Presentation(
     clauses=Clauses(
         results={"irregularity": "irregularity", "inertia": "required_inertia"},
         here=(
-            "the irregularity is {irregularity}; the wanted one takes a drive of {inertia}",
+            "the irregularity is {irregularity}; the wanted one needs a drive inertia of {inertia}",
             "the irregularity is {irregularity}",
         ),
         still="it runs evenly",

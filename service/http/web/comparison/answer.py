@@ -29,7 +29,7 @@ from sprag_study.service.languages import gettext
 from sprag_study.service.reading.part_names import lower_first
 from sprag_study.service.reading.reader import Phrase, joined, model_title, plural
 from sprag_study.service.results.headlines.along import curve_words
-from sprag_study.service.results.headlines.headline import NOTHING, short_titles
+from sprag_study.service.results.headlines.headline import NOTHING
 from sprag_study.service.results.refined import curve_plan
 from sprag_study.service.views.headline import headline_of, usual_query
 from sprag_study.service.views.library import reading_of
@@ -182,8 +182,7 @@ def _numbers(headline: Headline | None, reading: Reading) -> dict[str, KeyNumber
     if headline is None:
         return {}
     numbers = {one.title(reading): one for one in headline.numbers}
-    dimensions = zip(short_titles(headline.dimensions, reading), headline.dimensions, strict=True)
-    found = {**numbers, **{title: one for title, one in dimensions if title not in numbers}}
+    found = numbers | {one.title(reading): one for one in headline.dimensions if one.title(reading) not in numbers}
     judged = headline.judged
     if judged is not None and judged.title(reading) not in found:
         found = {judged.title(reading): judged, **found}

@@ -19,7 +19,6 @@ from sprag_study.service.results.curve_cases import draw, select
 from sprag_study.service.results.curves import CurveQuery, Curves
 from sprag_study.service.results.defaults import main_query
 from sprag_study.service.results.differences import differences
-from sprag_study.service.results.headlines.headline import short_captions
 from sprag_study.service.results.selection import value_of
 from sprag_study.service.views.relatives import asked_by, what_differs
 from sprag_study.worker import models
@@ -147,7 +146,7 @@ def labels(records: Sequence[StudyRecord]) -> list[str]:
 def short_names(studies: Sequence[Study], records: Sequence[StudyRecord], reading: Reading) -> list[str]:
     """What tells studies apart: the few numbers in which their machines differ, ``mass 0.5 kg``, or their names."""
     paths = what_differs(studies) if len(studies) > 1 else ()
-    captions = [lower_first(text) for text in short_captions([reading.caption(path) for path in paths])]
+    captions = [lower_first(reading.caption(path)) for path in paths]
     names = [
         ", ".join(f"{text} {_value(study, path, reading)}" for text, path in zip(captions, paths, strict=True))
         for study in studies

@@ -16,17 +16,17 @@ from sprag_study.service.http.web.form.entries import Values, names_of, plain
 from sprag_study.service.http.web.form.machine import BASE, Block, Entry, blocks, form_of, model_name
 from sprag_study.service.http.web.form.parts import PARTS, count_of
 from sprag_study.service.http.web.form.sent import IN_ROW, part_of, varied
-from sprag_study.service.languages import _
+from sprag_study.service.languages import _, gettext
 from sprag_study.service.reading.cyrillic import latin
 from sprag_study.service.reading.numbers import parse_number
 from sprag_study.service.reading.part_names import lower_first
 from sprag_study.service.reading.quantities import SI, offered, read_units, workshop_units
-from sprag_study.service.reading.reader import Reading
 from sprag_study.service.reading.together import with_last_unit
 from sprag_study.service.reading.units import QuantityError, parse_quantity, plain_signs
 from sprag_study.service.reading.wording import number, unit_text
 from sprag_study.worker.models.form import FormChoice
 from sprag_study.worker.models.parameters import model_parameter
+from sprag_study.worker.models.vocabulary import bare_caption
 
 if TYPE_CHECKING:
     from sprag_study.service.http.web.form.fields import Groups
@@ -358,7 +358,7 @@ class _Making:
         field, path, text = entry.field, self.path(entry.name), self.values.get(entry.name, "")
         label = _(field.label)
         if field.label in repeated and path in self.numbers:
-            label = re.sub(r", [^,]*\d+$", "", Reading(model_name(self.values)).caption(path))
+            label = bare_caption(model_name(self.values), path, gettext)
         was = None if self.before is None else self.before.get(entry.name, "")
         row = varied(self.values).get(path)
         plain = not getattr(entry.item, "lines", 0) and getattr(entry.item, "kind", "") in ("", "number")

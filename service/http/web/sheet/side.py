@@ -17,7 +17,6 @@ from sprag_study.service.languages import N_, gettext
 from sprag_study.service.reading.part_names import lower_first
 from sprag_study.service.reading.reader import Phrase, joined, term
 from sprag_study.service.results.defaults import main_query, varying_axes
-from sprag_study.service.results.headlines.headline import short_titles
 from sprag_study.service.results.refined_maps import map_plan
 from sprag_study.service.results.regimes import DOUBTFUL
 from sprag_study.service.views.headline import headline_of, is_small
@@ -188,8 +187,7 @@ def brief(headline: Headline | None, reading: Reading) -> str:
     if not headline.limits and not (headline.dimensions and headline.numbers):
         return reading.say(headline.sentence[0]) if headline.sentence else ""
     shown = headline.dimensions[:_DIMENSIONS]
-    titles = short_titles(headline.dimensions, reading)
-    told = (f"{lower_first(title)} {one.said(reading)}" for title, one in zip(titles, shown, strict=False))
+    told = (f"{lower_first(one.title(reading))} {one.said(reading)}" for one in shown)
     value = headline.numbers[0].said(reading) if headline.numbers else ""
     return f"{value}: {', '.join(told)}"
 
@@ -229,7 +227,7 @@ def _first(headline: Headline | None, reading: Reading) -> str:
     if headline is None or not headline.numbers:
         return ""
     first = headline.numbers[0]
-    return f"{short_titles([first], reading)[0]} {first.number(reading)} {first.unit_text(reading)}".strip()
+    return f"{first.title(reading)} {first.number(reading)} {first.unit_text(reading)}".strip()
 
 
 def _spark(trace: Trace | None) -> Markup:

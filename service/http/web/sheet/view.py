@@ -15,7 +15,6 @@ from sprag_study.service.http.web.sheet.side import Side, side_of
 from sprag_study.service.http.web.view_forms import Fact, fact_of
 from sprag_study.service.reading.catalogue import unit_of
 from sprag_study.service.results.choice import value_choices
-from sprag_study.service.results.headlines.headline import short_titles
 from sprag_study.service.spec.fields import renamed
 from sprag_study.service.views.headline import headline_of, usual_query
 from sprag_study.service.views.library import reading_of
@@ -116,10 +115,7 @@ def _sheet(
         list(map(reading.say, headline.sentence)),
         reading.say(headline.of),
         [fact_of(one, reading, own) for one in headline.numbers],
-        [
-            fact_of(one, reading, own)._replace(title=title)
-            for one, title in zip(headline.dimensions, short_titles(headline.dimensions, reading), strict=True)
-        ],
+        [fact_of(one, reading, own) for one in headline.dimensions],
         [fact_of(one, reading, own) for one in headline.limits],
         chart,
         machine_of(study, library.store.studies.spec(study_id), reading, best, variant),
