@@ -8,7 +8,7 @@ from typing import Final
 
 from sprag_study.engine.continuation.problem import End
 from sprag_study.engine.continuation.problem import Kind as Special
-from sprag_study.engine.vibration_drive.branches import NO_ORBIT
+from sprag_study.engine.machine_shaft.transient_run import OUTCOMES
 from sprag_study.service.actor import Role
 from sprag_study.service.fault_meanings import KIND_MEANINGS, MEANINGS, WARNING_MEANINGS
 from sprag_study.service.http.problems import PROBLEM_TYPES
@@ -55,8 +55,8 @@ def vocabulary() -> Iterator[str]:
         yield from filter(None, _of_model(model))
     for codes in (models.ENDING_SENTENCES, models.REGIME_SENTENCES, StudyState, DIRECTIONS):
         yield from map(_term, codes)
-    yield from map(_term, Special)
-    yield from (NO_ORBIT, *(end.sentence for end in End))
+    yield from map(_term, (*Special, *OUTCOMES))
+    yield from (end.sentence for end in End)
     yield from (*models.ENDING_SENTENCES.values(), *models.REGIME_SENTENCES.values())
     yield from (meaning for _name, _unit, meaning in TRANSIENT_RESULTS)
     yield from (state.sentence for state in StudyState)

@@ -8,6 +8,7 @@ sentences; neither knows a language, so this module stands below both.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Final, Self
@@ -17,7 +18,8 @@ from typing import Any, Final, Self
 class Amount:
     """A number in SI with its unit, a dash for none, rounded to ``digits``; ``bare`` shows the number without the unit.
 
-    ``form`` is how English sentences write the number, as `format` takes it, where it is not that many digits.
+    ``form`` is how English sentences write the number, as `format` takes it, where it is not that many digits. They
+    write an angle in rad in ``degrees`` where that is wanted.
     """
 
     value: float | None
@@ -25,10 +27,14 @@ class Amount:
     digits: int = 5
     bare: bool = False
     form: str = ""
+    degrees: bool = False
 
     def __str__(self) -> str:
-        text = "–" if self.value is None else format(self.value, self.form or f".{self.digits}g")
-        return text if self.bare or self.unit == "1" else f"{text} {self.unit}"
+        value, unit = self.value, self.unit
+        if self.degrees and value is not None:
+            value, unit = math.degrees(value), "deg"
+        text = "–" if value is None else format(value, self.form or f".{self.digits}g")
+        return text if self.bare or unit == "1" else f"{text} {unit}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,11 +1,12 @@
-"""The end of a transient and its cause as a sentence."""
+"""The end of a transient and its cause, as a sentence with its numbers."""
 
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+from sprag_study.sentences import Amount, Sentence
 
 #: The refusal of a load that jumps or has a kink over the speed.
-ROUGH_LOAD = (
+ROUGH_LOAD = Sentence(
     "The load is not smooth in the speed: a transient needs a formula without abs, sign, step, floor, mod, min, max "
     "or comparisons of omega."
 )
@@ -46,56 +47,100 @@ class Ends:
     no_cycle: str
 
 
-def shown(value: float) -> str:
-    """A number to four digits, without the sign of a zero."""
-    return f"{value + 0.0:.4g}"
-
-
-def cause_of(kind: str, outcome: str, results: Mapping[str, float], ends: Ends) -> str:
-    """A sentence about the end of a transient."""
-    lasted = f"{shown(results['duration'])} s and {shown(results['turns'])} revolutions"
+def cause_of(kind: str, outcome: str, results: Mapping[str, float], ends: Ends) -> Sentence:
+    """The sentence about the end of a transient."""
+    lasted = {"time": _amount(results["duration"], "s"), "turns": _amount(results["turns"])}
     if outcome == "too_stiff":
-        return (
-            f"The motion was followed for {lasted} only: the drive reacts too fast to the speed, or the shaft has too "
-            "little inertia for it."
+        return Sentence(
+            "The motion was followed for {time} and {turns} revolutions only: the drive reacts too fast to the speed, "
+            "or the shaft has too little inertia for it.",
+            **lasted,
         )
     if outcome == "reached":
-        cycle = "its steady cycle" if kind == "run-up" else "the new steady cycle"
-        left = "" if ends.within == 0.0 else f" to {shown(100.0 * ends.within)} % of the first difference in speed"
-        return f"The shaft comes to {cycle} after {lasted}{left and ','}{left}."
+        return _reached(kind, ends, lasted)
     if outcome == "not_reached":
-        return _going_on(kind, results, ends, lasted)
+        return _going_on(kind, ends, {**lasted, "speed": _amount(results["omega.end"], "rad/s")})
     if kind == "coasting":
-        back = " Weights and springs then turn it back." if ends.turns_back else ""
-        return f"The shaft stops after {lasted}.{back}"
+        if ends.turns_back:
+            return Sentence(
+                "The shaft stops after {time} and {turns} revolutions. Weights and springs then turn it back.", **lasted
+            )
+        return Sentence("The shaft stops after {time} and {turns} revolutions.", **lasted)
     return _stalled(outcome, ends, lasted)
 
 
-def _going_on(kind: str, results: Mapping[str, float], ends: Ends, lasted: str) -> str:
-    speed = f"The shaft still turns at {shown(results['omega.end'])} rad/s after {lasted}"
+def _amount(value: float, unit: str = "1") -> Amount:
+    """A number to four digits, without the sign of a zero."""
+    return Amount(float(value) + 0.0, unit, 4, form=".4g")
+
+
+def _reached(kind: str, ends: Ends, lasted: Mapping[str, Amount]) -> Sentence:
+    share = _amount(100.0 * ends.within)
+    if kind == "run-up":
+        if ends.within == 0.0:
+            return Sentence("The shaft comes to its steady cycle after {time} and {turns} revolutions.", **lasted)
+        return Sentence(
+            "The shaft comes to its steady cycle after {time} and {turns} revolutions, to {share} % of the first "
+            "difference in speed.",
+            share=share, **lasted,
+        )  # fmt: skip
+    if ends.within == 0.0:
+        return Sentence("The shaft comes to the new steady cycle after {time} and {turns} revolutions.", **lasted)
+    return Sentence(
+        "The shaft comes to the new steady cycle after {time} and {turns} revolutions, to {share} % of the first "
+        "difference in speed.",
+        share=share, **lasted,
+    )  # fmt: skip
+
+
+def _going_on(kind: str, ends: Ends, parts: Mapping[str, Amount]) -> Sentence:
     if kind == "coasting":
-        free = ends.mean_resistance >= -1e-12 * abs(ends.resistance)
-        return f"{speed}: {'nothing takes work from it over a cycle' if free else 'more revolutions are needed'}."
-    if not ends.cycle:
-        return f"{speed}; it comes to no steady cycle. {ends.no_cycle}".rstrip()
-    return f"{speed} and has not come to the steady cycle: more revolutions are needed, or it settles at another speed."
+        if ends.mean_resistance >= -1e-12 * abs(ends.resistance):
+            return Sentence(
+                "The shaft still turns at {speed} after {time} and {turns} revolutions: nothing takes work from it "
+                "over a cycle.",
+                **parts,
+            )
+        return Sentence(
+            "The shaft still turns at {speed} after {time} and {turns} revolutions: more revolutions are needed.",
+            **parts,
+        )
+    if ends.cycle:
+        return Sentence(
+            "The shaft still turns at {speed} after {time} and {turns} revolutions and has not come to the steady "
+            "cycle: more revolutions are needed, or it settles at another speed.",
+            **parts,
+        )
+    if not ends.no_cycle:
+        return Sentence(
+            "The shaft still turns at {speed} after {time} and {turns} revolutions; it comes to no steady cycle.",
+            **parts,
+        )
+    return Sentence(
+        "The shaft still turns at {speed} after {time} and {turns} revolutions; it comes to no steady cycle. {why}",
+        why=Sentence(ends.no_cycle), **parts,
+    )  # fmt: skip
 
 
-def _stalled(outcome: str, ends: Ends, lasted: str) -> str:
+def _stalled(outcome: str, ends: Ends, lasted: Mapping[str, Amount]) -> Sentence:
     """Why the drive could not keep the shaft turning."""
-    place = f"{shown(math.degrees(ends.angle))} deg"
+    parts = {"place": replace(_amount(ends.angle, "rad"), degrees=True), "resistance": _amount(-ends.resistance, "N*m")}
     if outcome == "not_started":
-        return (
-            f"The shaft does not start: at {place} the torque of the drive at rest, {shown(ends.drive)} N*m, does not "
-            f"exceed the resisting torque, {shown(-ends.resistance)} N*m."
-        )
-    begin = f"The shaft stops at {place}, after {lasted}: "
+        return Sentence(
+            "The shaft does not start: at {place} the torque of the drive at rest, {drive}, does not exceed the "
+            "resisting torque, {resistance}.",
+            drive=_amount(ends.drive, "N*m"), **parts,
+        )  # fmt: skip
+    parts |= lasted
     if -ends.mean_resistance > ends.largest_drive:
-        return (
-            f"{begin}the mean resisting torque, {shown(-ends.mean_resistance)} N*m, exceeds the largest torque of the "
-            f"drive, {shown(ends.largest_drive)} N*m."
-        )
-    return (
-        f"{begin}its energy is spent. The resisting torque there is {shown(-ends.resistance)} N*m, the torque of the "
-        f"drive at rest {shown(ends.drive)} N*m."
-    )
+        parts["resistance"] = _amount(-ends.mean_resistance, "N*m")
+        return Sentence(
+            "The shaft stops at {place}, after {time} and {turns} revolutions: the mean resisting torque, "
+            "{resistance}, exceeds the largest torque of the drive, {drive}.",
+            drive=_amount(ends.largest_drive, "N*m"), **parts,
+        )  # fmt: skip
+    return Sentence(
+        "The shaft stops at {place}, after {time} and {turns} revolutions: its energy is spent. The resisting torque "
+        "there is {resistance}, the torque of the drive at rest {drive}.",
+        drive=_amount(ends.drive, "N*m"), **parts,
+    )  # fmt: skip

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from sprag_study.engine.outcome import Trajectory
+from sprag_study.sentences import Sentence
 
 Kind = Literal["run-up", "load-step", "coasting"]
 #: How a transient can end; "no_motion" where there is none to begin with.
@@ -74,8 +75,8 @@ class Transient:
     ----------
     outcome : str
         One of ``Outcome``.
-    cause : str
-        A sentence about the end and its cause.
+    cause : Sentence
+        About the end and its cause.
     results : dict
         By name, of ``RESULTS``; NaN for missing ones.
     motion : Trajectory
@@ -83,6 +84,6 @@ class Transient:
     """
 
     outcome: Outcome
-    cause: str
+    cause: Sentence
     results: dict[str, float]
     motion: Trajectory

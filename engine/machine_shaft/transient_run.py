@@ -13,6 +13,7 @@ from sprag_study.engine.machine_shaft.quadrature import product
 from sprag_study.engine.machine_shaft.transient_bench import Bench, Cycle
 from sprag_study.engine.machine_shaft.transient_causes import Ends
 from sprag_study.engine.machine_shaft.transient_course import Course, Outcome
+from sprag_study.sentences import Sentence
 
 Floats = NDArray[np.float64]
 
@@ -20,7 +21,7 @@ Floats = NDArray[np.float64]
 OUTCOMES: tuple[Outcome, ...] = ("reached", "stopped", "not_started", "not_reached", "too_stiff")
 _TO_INTEGRAL = product(INTEGRAL, COEFFICIENTS)
 _TURN = 2.0 * np.pi
-_FIXED_DRIVE = "The torque of the drive does not follow the speed, so it balances no other load."
+_FIXED_DRIVE = Sentence("The torque of the drive does not follow the speed, so it balances no other load.")
 
 
 class Run:

@@ -17,6 +17,7 @@ from sprag_study.engine.machine_shaft.transient_causes import ROUGH_LOAD, cause_
 from sprag_study.engine.machine_shaft.transient_course import COLUMNS, RESULTS, Course, Transient
 from sprag_study.engine.machine_shaft.transient_run import OUTCOMES, Run
 from sprag_study.engine.outcome import Trajectory
+from sprag_study.sentences import Sentence
 
 Floats = NDArray[np.float64]
 
@@ -84,7 +85,7 @@ def transient(model: MachineSpec, columns: Mapping[str, ArrayLike], course: Cour
     row = Columns.of(model, columns, 1)
     bench, after, ending = _bench(model, row, course)
     if bench is None:
-        return _nothing(ending, ending.sentence)
+        return _nothing(ending, Sentence(ending.sentence))
     before = None if course.kind == "run-up" else bench.steady(1.0)
     if course.kind == "coasting" or (not bench.motor and (course.kind == "load-step" or ending is Ending.UNSTABLE)):
         after = None
@@ -102,7 +103,7 @@ def transient(model: MachineSpec, columns: Mapping[str, ArrayLike], course: Cour
     return Transient(outcome, cause, results, Trajectory(times, _NAMES, _UNITS, run.values(places), {}, ending))
 
 
-def _nothing(ending: Ending, cause: str) -> Transient:
+def _nothing(ending: Ending, cause: Sentence) -> Transient:
     """The answer where there is no motion."""
     motion = Trajectory(np.empty(0), _NAMES, _UNITS, np.empty((0, len(_NAMES))), {}, ending)
     return Transient("no_motion", cause, {name: np.nan for name, *_ in RESULTS}, motion)

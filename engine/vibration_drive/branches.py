@@ -22,16 +22,27 @@ from sprag_study.engine.vibration_drive.results import OF_RUNS, result_infos
 from sprag_study.engine.vibration_drive.return_map import DriveMap, Machines
 from sprag_study.engine.vibration_drive.settle import settle
 from sprag_study.engine.vibration_drive.strobes import BEGIN
+from sprag_study.sentences import Sentence, joined
 
 Floats = NDArray[np.float64]
 
 
 #: The beginning of what `NoOrbitError` says.
-NO_ORBIT: Final = "the case has no periodic motion of a turning shaft to be followed"
+NO_ORBIT: Final = Sentence("the case has no periodic motion of a turning shaft to be followed")
 
 
 class NoOrbitError(ValueError):
-    """The settled motion of the case has no orbit that can be followed."""
+    """The settled motion of the case has no orbit that can be followed.
+
+    Attributes
+    ----------
+    sentence : Sentence
+        Why.
+    """
+
+    def __init__(self, sentence: Sentence) -> None:
+        super().__init__(sentence)
+        self.sentence = sentence
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +109,7 @@ def branch(
     regime, ending = Regime(int(found.regimes[0])), ENDINGS[int(found.endings[0])]
     if regime != Regime.PERIODIC:
         what = ending.sentence if ending != Ending.OK else regime.sentence
-        raise NoOrbitError(f"{NO_ORBIT}: {what}")
+        raise NoOrbitError(joined(": ", (NO_ORBIT, Sentence(what))))
     order = int(found.orders[0])
     kernel = kernel_of(columns, settings.tolerance)
     units = _units(kernel, case_matrix(columns, settings.fine, 1), settings, found.points, order)

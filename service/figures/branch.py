@@ -48,7 +48,7 @@ def branch_figure(made: CaseBranch, study: Study, along: Along, result: str, own
         return Figure(
             x,
             (Panel(y, (), x=x),),
-            note=Phrase("There is no branch: {why}", why=joined(": ", map(Phrase, made.note.split(": ", 1)))),
+            note=Phrase("There is no branch: {why}", why=made.note),
         )
     values = made.values[:, column]
     full = stable_segments(made)

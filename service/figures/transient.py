@@ -8,7 +8,6 @@ import numpy as np
 
 from sprag_study.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
 from sprag_study.service.reading.reader import Phrase
-from sprag_study.service.results.transient_causes import cause_phrase
 
 if TYPE_CHECKING:
     from sprag_study.worker.models.transients import Transient
@@ -29,7 +28,7 @@ def transient_figure(made: Transient) -> Figure:
     """Speed with the means of the steady cycles, torques, and energy, over time."""
     x, times = Quantity(Phrase("time"), "s"), made.motion.times
     if not times.size:
-        return Figure(x, (Panel(Quantity(Phrase("speed"), "rad/s"), (), x=x),), note=cause_phrase(made.cause))
+        return Figure(x, (Panel(Quantity(Phrase("speed"), "rad/s"), (), x=x),), note=made.cause)
     panels = []
     for title, unit, lines in _PANELS:
         drawn = [
@@ -44,4 +43,4 @@ def transient_figure(made: Transient) -> Figure:
                 if np.isfinite(made.results[name])
             ]
         panels.append(Panel(Quantity(title, unit), tuple(drawn)))
-    return Figure(x, tuple(panels), motion=True, below=cause_phrase(made.cause))
+    return Figure(x, tuple(panels), motion=True, below=made.cause)

@@ -17,7 +17,7 @@ from sprag_study.service.json_text import numbers
 from sprag_study.service.languages import N_, _
 from sprag_study.service.reading.catalogue import unit_of
 from sprag_study.service.reading.directions import case_values
-from sprag_study.service.reading.reader import Phrase, joined, plural
+from sprag_study.service.reading.reader import Phrase, plural
 from sprag_study.service.reading.units import QuantityError, typed_value
 from sprag_study.service.results.selection import axis_name, ends_of_range
 from sprag_study.service.views.case_questions import BRANCH, BranchQuestion
@@ -302,8 +302,7 @@ class BranchView(CaseView[BranchQuestion, tuple[Along, str], CaseBranch]):
         """How far the branch goes, and what is special on it; or why there is none."""
         made = answer.result
         if made.note:
-            why = joined(": ", map(Phrase, made.note.split(": ", 1)))
-            return Shown((Phrase("This case has no branch: {why}", why=why),))
+            return Shown((Phrase("This case has no branch: {why}", why=made.note),))
         ends = {"first": Phrase(made.ends[0]), "last": Phrase(made.ends[1])}
         sentence = plural(
             "{count} orbit of order {order}; from {first} to {last}",

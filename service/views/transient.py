@@ -14,7 +14,6 @@ from sprag_study.service.reading.limits import span
 from sprag_study.service.reading.numbers import in_language
 from sprag_study.service.reading.reader import Phrase, joined, term
 from sprag_study.service.reading.units import QuantityError, typed_value
-from sprag_study.service.results.transient_causes import cause_phrase
 from sprag_study.service.views.case_questions import TRANSIENT, TransientQuestion
 from sprag_study.service.views.case_view import CaseAnswer, CaseView, Said
 from sprag_study.service.views.setting import Offered
@@ -215,7 +214,7 @@ class TransientView(CaseView[TransientQuestion, tuple[Course, int], Transient]):
             for name, unit, meaning in RESULTS
             if math.isfinite(made.results[name])
         ]
-        end = joined(" ", (Whole(term(made.outcome)), cause_phrase(made.cause)))
+        end = joined(" ", (Whole(term(made.outcome)), made.cause))
         return Shown((end,), (ShownTable(_("Results"), (Column(Phrase("Meaning")), Column(Phrase("Value"))), rows),))
 
     def said(self, answer: CaseAnswer[tuple[Course, int], Transient]) -> Said:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import pytest
 
 from sprag_study.engine.machine_shaft.transient_causes import ROUGH_LOAD, Ends, cause_of
 from sprag_study.engine.machine_shaft.transient_run import _FIXED_DRIVE
+from sprag_study.sentences import sentence_of
 from sprag_study.service.languages import language
 from sprag_study.service.reading.reader import Reading
-from sprag_study.service.results.transient_causes import cause_phrase
 
 ENDS = Ends(
     angle=1.25, drive=2.0, largest_drive=3.0, resistance=-2.5, mean_resistance=-1.5, turns_back=True, within=0.05,
@@ -30,7 +31,7 @@ RESULTS = {"duration": 1.8725, "turns": 2.4142, "omega.end": 12.345}
 def test_each_cause_is_told_in_ukrainian(kind: str, outcome: str) -> None:
     english = cause_of(kind, outcome, RESULTS, ENDS)
     with language("uk"):
-        told = Reading("machine-shaft").say(cause_phrase(english))
+        told = Reading("machine-shaft").say(english)
     assert told != english
     assert not any(word in told for word in ("shaft", "torque", "The "))
     assert ("1,872" in told) == ("1.872" in english)
@@ -41,5 +42,18 @@ def test_causes_without_numbers_are_told_in_ukrainian() -> None:
     assert _FIXED_DRIVE in no_cycle
     for english in (ROUGH_LOAD, no_cycle):
         with language("uk"):
-            told = Reading("machine-shaft").say(cause_phrase(english))
+            told = Reading("machine-shaft").say(english)
         assert not any(word in told for word in ("shaft", "torque", "The ")), told
+
+
+def test_an_angle_is_in_degrees_in_files_and_in_the_unit_of_a_reader() -> None:
+    stopped = cause_of("run-up", "stalled", RESULTS, ENDS)
+    assert stopped.startswith("The shaft stops at 71.62 deg, after 1.873 s and 2.414 revolutions: ")
+    assert "at 1.25 rad, after" in Reading("machine-shaft").say(stopped)
+
+
+def test_a_transient_keeps_its_sentence_when_it_leaves_its_process() -> None:
+    stopped = cause_of("run-up", "stalled", RESULTS, ENDS)
+    known = pickle.loads(pickle.dumps(stopped))
+    assert Reading("machine-shaft").say(known) == Reading("machine-shaft").say(stopped)
+    assert Reading("machine-shaft").say(sentence_of(stopped.to_json())) == Reading("machine-shaft").say(stopped)

@@ -44,7 +44,7 @@ def branch_of(study: Study, case: int, along: Along) -> CaseBranch:
         nothing = np.empty(0)
         return CaseBranch(
             value, 0, nothing, nothing, np.empty(0, dtype=np.bool_), names, units, np.empty((0, len(names))), (),
-            ("", ""), str(error),
+            ("", ""), error.sentence,
         )  # fmt: skip
     return CaseBranch(
         value,
