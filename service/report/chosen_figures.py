@@ -17,7 +17,6 @@ from sprag_study.service.results.curve_cases import select
 from sprag_study.service.results.curves import CurveQuery, Map
 from sprag_study.service.results.defaults import caption, drawn_numbers
 from sprag_study.service.results.stored_curves import drawn_curves, stored_map
-from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from sprag_study.service.figures.figure import Figure
@@ -56,7 +55,7 @@ def require_figure(study: Study, view: View) -> None:
     """Raise SelectionError where the study has not what a view of curves or of a map shows, or it cannot be drawn."""
     query = figure_query(study, view)
     curves = CurveQuery(query.x, (query.z,), (query.y,), query.at) if isinstance(query, MapQuery) else query
-    select(study, models.study_results(study), curves)
+    select(study, curves)
     check_size("points", drawn_numbers(study, curves), MAX_PICTURE_POINTS)
 
 
@@ -79,7 +78,7 @@ def chosen_figures(store: Store, study_id: str, choice: Choice) -> tuple[ChosenF
 def figure_query(study: Study, view: View) -> CurveQuery | MapQuery:
     """What a view shows; raises SelectionError."""
     find = map_query if view.page == "map" else curve_query
-    query = find(study, models.study_results(study), Address(view.query))
+    query = find(study, Address(view.query))
     if query is None:
         raise refused(
             "page", "nothing-varies",

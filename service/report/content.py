@@ -120,14 +120,12 @@ class Report:
 
         Raises SelectionError for chosen curves and for a working point that cannot be shown.
         """
-        query = answers_query(self.study, self.infos, self.chosen)
+        query = answers_query(self.study, self.chosen)
         point = self.question.point or self._place_of_batch(query)
         if query is None and self.study.cases > 1 and not point:
             return None
         try:
-            found = find_answers(
-                self.study, self.infos, query if self.chosen is None else self.chosen, point, self.fetch
-            )
+            found = find_answers(self.study, query if self.chosen is None else self.chosen, point, self.fetch)
             if found.drawn is not None:
                 require_drawable([found.drawn])
         except SelectionError:
@@ -165,7 +163,7 @@ class Report:
         if len(varying_axes(self.study)) < 2 or self.study.plan is not None:
             return ()
         try:
-            found = sensitivity(self.study, self.spec, drawn_results(self.study, self.infos)[:MOST_RESULTS], self.fetch)
+            found = sensitivity(self.study, self.spec, drawn_results(self.study)[:MOST_RESULTS], self.fetch)
         except SelectionError:  # too large a study
             return ()
         return tuple(item for item in found if item.cases)
@@ -190,7 +188,7 @@ class Report:
     @cached_property
     def drives(self) -> DrivesPart | None:
         """What tolerances do; None for a study without them."""
-        return drives_part(self.study, self.infos, self.fetch)
+        return drives_part(self.study, self.fetch)
 
     @cached_property
     def designs(self) -> Designs | None:
@@ -244,12 +242,12 @@ class Report:
         """The curves of all results that the sheets do not draw, a page each; or why there are none."""
         drawn = None if self.answers is None else self.answers.drawn
         already = frozenset(() if drawn is None else (info.name for info in drawn.selection.results))
-        return _pictures(self.study, self.infos, already, self.fetch)
+        return _pictures(self.study, already, self.fetch)
 
     @cached_property
     def maps(self) -> tuple[Map, ...]:
         """The refined maps of a study."""
-        return _maps(self.study, self.infos, self.fetch)
+        return _maps(self.study, self.fetch)
 
 
 def _shortened(text: str) -> str:
@@ -299,21 +297,19 @@ def ranges(model: str, infos: Sequence[ResultInfo], blocks: Iterable[RowBlock]) 
     return tuple(Range(*row) if row[1] else Range(row[0], 0, None, None, None, None, None) for row in found)
 
 
-def _pictures(
-    study: Study, infos: tuple[ResultInfo, ...], already: frozenset[str], fetch: Fetch
-) -> tuple[tuple[Curves, ...], str]:
+def _pictures(study: Study, already: frozenset[str], fetch: Fetch) -> tuple[tuple[Curves, ...], str]:
     """The study's main curves of all results but those ``already`` drawn, a page each; or why there are none."""
-    query = main_query(study, infos)
+    query = main_query(study)
     if query is None:
         return (), "" if study.plan is not None else _(no_curves(study))
     if study.plan is not None and curve_plan(study) is None:  # its cases lie on no curves
         return (), ""
     checks = models.presentation_of(study).checks
-    chosen = _in_groups([info for info in infos if info.name not in already], checks)
+    chosen = _in_groups([info for info in models.study_results(study) if info.name not in already], checks)
     if not chosen:
         return (), ""
     try:
-        whole = draw(select(study, infos, replace(query, y=tuple(info.name for info in chosen))), fetch)
+        whole = draw(select(study, replace(query, y=tuple(info.name for info in chosen))), fetch)
         shown = [info for info in chosen if varies(whole, info)][:_MOST_RESULTS]
         groups = [shown[start : start + _RESULTS_A_PICTURE] for start in range(0, len(shown), _RESULTS_A_PICTURE)]
         parts = tuple(replace(whole, selection=replace(whole.selection, results=tuple(group))) for group in groups)
@@ -331,7 +327,7 @@ def varies(drawn: Curves, info: ResultInfo) -> bool:
     return bool(known.size and np.ptp(known) > _SAME * np.abs(known).max())
 
 
-def _maps(study: Study, infos: tuple[ResultInfo, ...], fetch: Fetch) -> tuple[Map, ...]:
+def _maps(study: Study, fetch: Fetch) -> tuple[Map, ...]:
     """The refined maps of a study: one for each result that was asked for and each combination of the other axes."""
     plan = map_plan(study)
     if plan is None:
@@ -339,7 +335,7 @@ def _maps(study: Study, infos: tuple[ResultInfo, ...], fetch: Fetch) -> tuple[Ma
     y, x = (axis.paths[0] for axis in plan.adaptive)
     held = product(*([(axis.paths[0], repr(value)) for value in axis.values] for axis in plan.fixed))
     every = [(name, at) for at in held for name in plan.results][:_MOST_MAPS]
-    return tuple(draw_map(study, infos, x, y, name, at, fetch) for name, at in every)
+    return tuple(draw_map(study, x, y, name, at, fetch) for name, at in every)
 
 
 def _in_groups(infos: Sequence[ResultInfo], checks: tuple[str, ...]) -> list[ResultInfo]:

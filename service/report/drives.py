@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -21,7 +20,6 @@ from sprag_study.service.results.tolerances.yields import yields
 if TYPE_CHECKING:
     from sprag_study.service.figures.figure import Figure
     from sprag_study.service.results.curves import Fetch
-    from sprag_study.worker.models import ResultInfo
     from sprag_study.worker.study import Study
 
 #: Drives in the list of the worst ones.
@@ -37,15 +35,15 @@ class DrivesPart:
     sentences: tuple[str, ...]
 
 
-def drives_part(study: Study, infos: Sequence[ResultInfo], fetch: Fetch) -> DrivesPart | None:
+def drives_part(study: Study, fetch: Fetch) -> DrivesPart | None:
     """The part about the drives; None for a study without tolerances, or one that chooses its own cases."""
     if study.spread is None or study.plan is not None:
         return None
-    names = drawn_results(study, infos)
+    names = drawn_results(study)
     try:
-        drawn = ribbon(study, infos, names, Asked(), QUANTILES, fetch)
+        drawn = ribbon(study, names, Asked(), QUANTILES, fetch)
         wanted = first_condition(study, judged_by(study, names))
-        reached = yields(study, infos, [wanted], Asked(), _WORST, fetch)
+        reached = yields(study, [wanted], Asked(), _WORST, fetch)
     except SelectionError as error:
         return DrivesPart(None, "", (Phrase("There are no ribbons here: {why}.", why=str(error)),))
     sentences: list[str] = [plural("{count} drive was drawn.", "{count} drives were drawn.", study.drives)]

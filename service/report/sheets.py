@@ -28,6 +28,7 @@ from sprag_study.service.report.trust import trust
 from sprag_study.service.results.defaults import caption
 from sprag_study.service.results.key_answers import answers_of_model
 from sprag_study.service.results.selection import held_text
+from sprag_study.worker import models
 from sprag_study.worker.spread import DRIVE
 
 if TYPE_CHECKING:
@@ -129,7 +130,7 @@ def _results(report: Report) -> list[str]:
     if report.question.y:
         return list(report.question.y)
     main = () if found is None or found.query is None else found.query.y
-    return list(dict.fromkeys((*(one.result for one in answers_of_model(report.study, report.infos)), *main)))
+    return list(dict.fromkeys((*(one.result for one in answers_of_model(report.study)), *main)))
 
 
 def _along(report: Report) -> Iterator[Section]:
@@ -143,7 +144,7 @@ def _along(report: Report) -> Iterator[Section]:
         yield Section(_("Results"), (Table(("", ""), own, (1,)),), 2)
         return
     read, curve = report.reading, found.drawn.curves[place]
-    infos = {info.name: info for info in report.infos}
+    infos = models.results_by_name(report.study)
     names = [name for name in _results(report) if name in curve.y][:_RESULTS]
     units = {name: infos[name].unit for name in names}
     moves = curve.regimes is not None

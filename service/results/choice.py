@@ -28,7 +28,6 @@ from sprag_study.worker import models
 from sprag_study.worker.directions import SWEEP
 
 if TYPE_CHECKING:
-    from sprag_study.worker.models import ResultInfo
     from sprag_study.worker.study import Study
 
 
@@ -67,20 +66,20 @@ class MapQuery:
     at: tuple[tuple[str, str], ...]
 
 
-def characteristic(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
+def characteristic(study: Study) -> CurveQuery | None:
     """The mechanical characteristic: speed, torque, power and efficiency along the study's main axis."""
-    main = main_query(study, infos)
+    main = main_query(study)
     if main is None or curve_plan(study) is not None:
         return main  # refined curves are right for the results that were asked for
-    return CurveQuery(main.x, main_results(study, infos), main.by, main.at, of=main.of)
+    return CurveQuery(main.x, main_results(study), main.by, main.at, of=main.of)
 
 
-def curve_query(study: Study, infos: Sequence[ResultInfo], given: Given) -> CurveQuery | None:
+def curve_query(study: Study, given: Given) -> CurveQuery | None:
     """The curves requested by a URL; None for a study whose cases lie on no curves.
 
     Open axes are held at their usual value. Invalid choices are left for `select` to refuse.
     """
-    main = main_query(study, infos)
+    main = main_query(study)
     if main is None:
         return None
     x = given.get("x") or main.x
@@ -127,7 +126,7 @@ def value_choices(study: Study, query: CurveQuery) -> list[dict[str, Any]]:
     return found
 
 
-def map_query(study: Study, infos: Sequence[ResultInfo], given: Given) -> MapQuery | None:
+def map_query(study: Study, given: Given) -> MapQuery | None:
     """The map requested by a URL; None where fewer than two axes vary."""
     plan = map_plan(study)
     if plan is not None:
@@ -140,7 +139,7 @@ def map_query(study: Study, infos: Sequence[ResultInfo], given: Given) -> MapQue
         x, y, z = given.get("x") or x, given.get("y") or y, given.get("z") or plan.results[0]
         return MapQuery(x, y, z, held(study, given.getlist("at"), (x, y)))
     varying = varying_axes(study)
-    main = main_query(study, infos)
+    main = main_query(study)
     if main is None or study.combine != "grid" or len(varying) < 2:
         return None
     x = given.get("x") or main.x

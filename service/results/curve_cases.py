@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 NOTHING: Final[Mapping[int, Sequence[int]]] = MappingProxyType({})
 
 
-def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Selection:
+def select(study: Study, query: CurveQuery) -> Selection:
     """Select the cases of the curves of ``query``.
 
     Of refined curves, a fixed axis without a role is one of ``by``, and so is the direction of a sweep. Curves are
@@ -64,6 +64,7 @@ def select(study: Study, infos: Sequence[ResultInfo], query: CurveQuery) -> Sele
         For an unknown path or result, a value that is not on its axis, an open axis, or too many numbers. Axes of
         listed cases that are left open distinguish curves, too, where these are few.
     """
+    infos = models.study_results(study)
     results = numeric_results(infos, "y", query.y)
     x_axis = require_axis(study, "x", query.x)
     fixed = locate_axes(study, query.at)
@@ -126,10 +127,10 @@ def _with_kinds(names: list[str], regime: ResultInfo | None) -> list[str]:
 
 
 def check_map(
-    study: Study, infos: Sequence[ResultInfo], x: str, y: str, z: str, at: Sequence[tuple[str, str]]
+    study: Study, x: str, y: str, z: str, at: Sequence[tuple[str, str]]
 ) -> tuple[ResultInfo, tuple[tuple[float, ...], Iterator[Line]]]:
     """The result and the rows of the map of a grid; SelectionError as of `select`."""
-    (result,) = numeric_results(infos, "z", (z,))
+    (result,) = numeric_results(models.study_results(study), "z", (z,))
     if study.combine == "zip":
         raise refused("x", "not-a-grid", "a map needs a grid; the axes of this study are zipped")
     x_axis, y_axis = require_axis(study, "x", x), require_axis(study, "y", y)
@@ -139,17 +140,15 @@ def check_map(
     return result, _grid_lines(study, x_axis, {y: y_axis}, fixed, 1, way_out=LEFT_OPEN)
 
 
-def draw_map(
-    study: Study, infos: Sequence[ResultInfo], x: str, y: str, z: str, at: Sequence[tuple[str, str]], fetch: Fetch
-) -> Map:
+def draw_map(study: Study, x: str, y: str, z: str, at: Sequence[tuple[str, str]], fetch: Fetch) -> Map:
     """One result over two axes of a grid, or of a refined map; raises SelectionError as `select` does."""
     plan = map_plan(study)
     if plan is not None:
-        return draw_refined_map(study, infos, plan, (x, y, z), at, fetch)
-    result, (x_values, lines) = check_map(study, infos, x, y, z, at)
+        return draw_refined_map(study, plan, (x, y, z), at, fetch)
+    result, (x_values, lines) = check_map(study, x, y, z, at)
     rows = list(lines)
     cases = np.stack([row.cases for row in rows])
-    regime = models.regime_info(infos)
+    regime = models.regime_info(models.study_results(study))
     columns = fetch(cases.reshape(-1), _with_kinds([z], regime))
     endings = [ending or PENDING for ending in columns.endings]
     regimes, orders = kinds_of(columns.values, regime)

@@ -34,7 +34,6 @@ from sprag_study.worker.spread import DRIVE
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag_study.worker.models import ResultInfo
     from sprag_study.worker.study import Axis, Study
 
 #: Of an axis with more values than `MOST_CURVES`, so many of these are drawn first.
@@ -45,7 +44,7 @@ MOST_CHOICES: Final = 200
 _MOST_MAIN: Final = 10
 
 
-def main_query(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
+def main_query(study: Study) -> CurveQuery | None:
     """What to draw for ``study``; None where its cases lie on no curves (`no_curves` says why).
 
     Axes that are not drawn are held at the base's value where they contain it, otherwise at their middle value, and the
@@ -60,8 +59,7 @@ def main_query(study: Study, infos: Sequence[ResultInfo]) -> CurveQuery | None:
     if not varying:
         return None
     shown = models.presentation_of(study)
-    names = [info.name for info in infos]
-    y = tuple(name for name in shown.drawn if name in names) or (names[0],)
+    y = _drawn(study)
     along = [path for path in shown.along for axis in varying if path in axis.paths]
     if study.combine == "zip":
         return _listed_query(study, dict.fromkeys([*along, *(axis.paths[0] for axis in varying)]), y)
@@ -163,7 +161,6 @@ def many_values(
 
 def completed(
     study: Study,
-    infos: Sequence[ResultInfo],
     x: str | None,
     y: tuple[str, ...],
     by: tuple[str, ...],
@@ -177,8 +174,8 @@ def completed(
     if x and y:
         return CurveQuery(x, y, by, at, of=of)
     if x:
-        return CurveQuery(x, drawn_results(study, infos), by, at, of=of)
-    main = main_query(study, infos)
+        return CurveQuery(x, drawn_results(study), by, at, of=of)
+    main = main_query(study)
     if main is None:
         raise refused(
             "x", "not-an-axis",
@@ -197,19 +194,22 @@ def completed(
     )
 
 
-def drawn_results(study: Study, infos: Sequence[ResultInfo]) -> tuple[str, ...]:
+def drawn_results(study: Study) -> tuple[str, ...]:
     """The results that are drawn unless others are asked for, also of a study in which nothing varies."""
-    main = main_query(study, infos)
-    names = {info.name for info in infos}
-    shown = tuple(name for name in models.presentation_of(study).drawn if name in names)
-    return main.y if main is not None else shown or (infos[0].name,)
+    main = main_query(study)
+    return _drawn(study) if main is None else main.y
 
 
-def main_results(study: Study, infos: Sequence[ResultInfo]) -> tuple[str, ...]:
+def _drawn(study: Study) -> tuple[str, ...]:
+    """The results that the model draws, of those that the study has; its first one where there is none."""
+    known = models.results_by_name(study)
+    return tuple(filter(known.__contains__, models.presentation_of(study).drawn)) or tuple(known)[:1]
+
+
+def main_results(study: Study) -> tuple[str, ...]:
     """The main results according to the model; the first ones where it names none."""
-    names = [info.name for info in infos]
-    main = models.presentation_of(study).main
-    return tuple(name for name in main if name in names) or tuple(names[:_MOST_MAIN])
+    known = models.results_by_name(study)
+    return tuple(filter(known.__contains__, models.presentation_of(study).main)) or tuple(known)[:_MOST_MAIN]
 
 
 def varying_axes(study: Study) -> list[Axis]:

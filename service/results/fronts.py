@@ -182,7 +182,7 @@ def _for_derivatives(rounds: Sequence[RoundRecord], designs: int, each: int) -> 
 
 def infos_of(study: Study, plan: GoalPlan) -> dict[str, ResultInfo]:
     """What goals and limits are about, by name: a result, its quantile over the drives, a yield."""
-    known = {info.name: info for info in models.study_results(study)}
+    known = models.results_by_name(study)
     found: dict[str, ResultInfo] = {}
     for item in plan.items:
         if item.conditions:

@@ -122,9 +122,9 @@ class StudyAnswers:
     drawn: Curves | None
 
 
-def answers_of_model(study: Study, infos: Sequence[ResultInfo]) -> tuple[Answer, ...]:
+def answers_of_model(study: Study) -> tuple[Answer, ...]:
     """The answers that the model names and the study has; extremes of the drawn results of a model that names none."""
-    names = {info.name for info in infos}
+    names = models.results_by_name(study)
     named = tuple(one for one in models.presentation_of(study).answers if one.result in names)
     if named:
         return named
@@ -132,7 +132,7 @@ def answers_of_model(study: Study, infos: Sequence[ResultInfo]) -> tuple[Answer,
         ("largest", N_("Largest {name}")),
         ("smallest", N_("Smallest {name}")),
     )
-    drawn = [name for name in drawn_results(study, infos) if name in names][:2]
+    drawn = [name for name in drawn_results(study) if name in names][:2]
     return tuple(
         Answer(f"{kind}_{name}", Phrase(text, name=Name(name, within=True)), name, kind)
         for name in drawn
@@ -140,7 +140,7 @@ def answers_of_model(study: Study, infos: Sequence[ResultInfo]) -> tuple[Answer,
     )
 
 
-def answers_query(study: Study, infos: Sequence[ResultInfo], chosen: CurveQuery | None = None) -> CurveQuery | None:
+def answers_query(study: Study, chosen: CurveQuery | None = None) -> CurveQuery | None:
     """The curves of the main results that answers are read from: those of the page, or of the ``chosen`` ones.
 
     None where the cases of the study lie on no curves: nothing varies, it chooses its own cases, or each is a machine
@@ -148,10 +148,10 @@ def answers_query(study: Study, infos: Sequence[ResultInfo], chosen: CurveQuery 
     """
     if study.plan is not None and curve_plan(study) is None:
         return None
-    query = chosen or main_query(study, infos)
+    query = chosen or main_query(study)
     if query is None:
         return None
-    y = query.y if curve_plan(study) is not None else main_results(study, infos)
+    y = query.y if curve_plan(study) is not None else main_results(study)
     return replace(query, y=y)
 
 
@@ -183,7 +183,6 @@ def place_of(study: Study, path: str, text: str) -> float:
 
 def find_answers(
     study: Study,
-    infos: Sequence[ResultInfo],
     query: CurveQuery | None,
     point: str | None,
     fetch: Fetch,
@@ -198,16 +197,16 @@ def find_answers(
     SelectionError
         As `select` does; and where ``point`` is given although there is no axis for it.
     """
-    answers, by_name = answers_of_model(study, infos), {info.name: info for info in infos}
+    answers, by_name = answers_of_model(study), models.results_by_name(study)
     overall = () if whole is None else tuple(_overall(study, answers, by_name, whole))
     if query is None:
         if point:
             raise refused("point", "not-used", "the cases of this study lie on no curves", point, allowed="no point")
-        curves = (_single(study, infos, answers, by_name, fetch),) if study.cases == 1 else ()
+        curves = (_single(study, answers, by_name, fetch),) if study.cases == 1 else ()
         return StudyAnswers(None, None, "1", curves, () if study.cases == 1 else overall, None)
     x = read_point(study, query, point)
     names = dict.fromkeys([*query.y, *(one.result for one in answers)])
-    drawn = draw(select(study, infos, replace(query, y=tuple(models.with_half_widths(names, by_name)))), fetch)
+    drawn = draw(select(study, replace(query, y=tuple(models.with_half_widths(names, by_name)))), fetch)
     found = []
     for curve in drawn.curves:
         reader = _Reader(curve, query.x, x)
@@ -223,14 +222,14 @@ def find_answers(
     return StudyAnswers(query, x, unit_of(study, query.x), tuple(found), overall, replace(drawn, selection=shown_only))
 
 
-def answers_at(study: Study, infos: Sequence[ResultInfo], found: StudyAnswers, place: int, x: float) -> CurveAnswers:
+def answers_at(study: Study, found: StudyAnswers, place: int, x: float) -> CurveAnswers:
     """The answers of the curve at ``place`` of those ``found`` that are drawn, at another working point of it."""
     assert found.query is not None
     assert found.drawn is not None
-    by_name = {info.name: info for info in infos}
+    by_name = models.results_by_name(study)
     reader = _Reader(found.drawn.curves[place], found.query.x, x)
     main = (Answer(name, name, name, "here") for name in found.query.y)
-    every = (one for one in answers_of_model(study, infos) if _fits(study, one, found.query.x))
+    every = (one for one in answers_of_model(study) if _fits(study, one, found.query.x))
     return CurveAnswers(
         found.curves[place].line,
         tuple(reader.read(one, by_name[one.result], found.drawn) for one in every),
@@ -256,13 +255,12 @@ def _fits(study: Study, answer: Answer, x: str) -> bool:
 
 def _single(
     study: Study,
-    infos: Sequence[ResultInfo],
     answers: Sequence[Answer],
     by_name: dict[str, ResultInfo],
     fetch: Fetch,
 ) -> CurveAnswers:
     """The main results of the only case."""
-    main = [Answer(name, name, name, "here") for name in main_results(study, infos)]
+    main = [Answer(name, name, name, "here") for name in main_results(study)]
     here = [one for one in answers if one.kind == "here"]
     names = dict.fromkeys(one.result for one in (*main, *here))
     columns = fetch(np.zeros(1, dtype=np.int64), models.with_half_widths(names, by_name))

@@ -22,7 +22,6 @@ from sprag_study.worker.planning.rounds import Rows
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag_study.worker.models import ResultInfo
     from sprag_study.worker.planning.refine import Map as Described
     from sprag_study.worker.study import Study
 
@@ -44,7 +43,6 @@ def squares(plan: RefinePlan) -> int:
 
 def draw_refined_map(
     study: Study,
-    infos: Sequence[ResultInfo],
     plan: RefinePlan,
     names: tuple[str, str, str],
     at: Sequence[tuple[str, str]],
@@ -52,7 +50,7 @@ def draw_refined_map(
 ) -> Map:
     """The map of ``names`` (x, y, result); raises SelectionError."""
     x, y, z = names
-    (result,) = numeric_results(infos, "z", (z,))
+    (result,) = numeric_results(models.study_results(study), "z", (z,))
     sides = _sides(plan, x, y)
     if z not in plan.results:
         raise refused("z", "invalid-choice", "the map was not refined for this result", z, allowed=listed(plan.results))

@@ -22,7 +22,7 @@ _MOST_FURTHER: Final = 4
 def stored_curves(store: Store, study_id: str, query: CurveQuery) -> Curves:
     """The curves of a study; raises StudyNotFoundError, and SelectionError as `select` does."""
     study = store.studies.study(study_id)
-    selection = select(study, models.study_results(study), query)
+    selection = select(study, query)
     return draw(selection, partial(store.rows.for_cases, study_id, number=query.number))
 
 
@@ -44,4 +44,4 @@ def stored_map(store: Store, study_id: str, query: CurveQuery) -> Map:
     """The map of the one result of ``query`` over its x and its one axis of by; raises as `stored_curves` does."""
     study = store.studies.study(study_id)
     fetch = partial(store.rows.for_cases, study_id, number=query.number)
-    return draw_map(study, models.study_results(study), query.x, query.by[0], query.y[0], query.at, fetch)
+    return draw_map(study, query.x, query.by[0], query.y[0], query.at, fetch)

@@ -19,7 +19,6 @@ from sprag_study.service.views import study_view
 from sprag_study.service.views.curves import completed_query
 from sprag_study.service.views.study_questions import ANSWERS, AnswersQuestion
 from sprag_study.service.views.study_view import StudyAnswer, StudyView
-from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -41,8 +40,7 @@ class AnswersChoice:
 def answers_of(library: Library, study_id: str, chosen: CurveQuery | None, point: str | None) -> StudyAnswers:
     """The answers of a study, of the ``chosen`` curves; raises StudyNotFoundError, and SelectionError."""
     study = library.store.studies.study(study_id)
-    infos = models.study_results(study)
-    query = answers_query(study, infos, chosen)
+    query = answers_query(study, chosen)
     if query is None and chosen is not None:
         raise refused(
             "x", "not-used", "the cases of this study lie on no curves", chosen.x, allowed="no choice of curves"
@@ -50,7 +48,7 @@ def answers_of(library: Library, study_id: str, chosen: CurveQuery | None, point
     # While a large study runs, all its rows would be read again for each of its chunks.
     over = library.store.studies.get(study_id).over or study.cases <= study_view.FEW
     whole = partial(whole_columns, library, study_id) if over else None
-    return find_answers(study, infos, query, point, partial(library.store.rows.for_cases, study_id), whole)
+    return find_answers(study, query, point, partial(library.store.rows.for_cases, study_id), whole)
 
 
 def whole_columns(library: Library, study_id: str, names: Sequence[str]) -> CaseColumns:
@@ -74,10 +72,9 @@ class AnswersView(StudyView[AnswersQuestion, AnswersChoice, StudyAnswers]):
 
     def check(self, study: Study, chosen: AnswersChoice) -> None:
         """The axes and the working point."""
-        infos = models.study_results(study)
-        query = answers_query(study, infos, chosen.query)
+        query = answers_query(study, chosen.query)
         if query is not None:
-            select(study, infos, query)
+            select(study, query)
             read_point(study, query, chosen.point)
 
     def small(self, study: Study, chosen: AnswersChoice) -> bool:

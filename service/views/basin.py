@@ -151,7 +151,7 @@ def _ends(
 
 def basin_json(study: Study, query: BasinQuery, made: Basin) -> BasinData:
     """A basin as JSON data."""
-    infos = {info.name: info for info in models.result_infos(study.model, models.variant_of(study))}
+    infos = models.results_by_name(study)
     regimes: list[RegimeRow] = []
     for number, row in enumerate(made.values.tolist()):
         results: dict[str, Any] = {}

@@ -59,8 +59,7 @@ def completed_query(
     of: Sequence[str] | None,
 ) -> CurveQuery:
     """The curves of settings; what is not given is as on the page of the study."""
-    infos = models.study_results(study)
-    return completed(study, infos, x, tuple(y or ()), tuple(by or ()), pairs(at), pairs(of, "of"))
+    return completed(study, x, tuple(y or ()), tuple(by or ()), pairs(at), pairs(of, "of"))
 
 
 def _numbered(study: Study, query: CurveQuery, number: int) -> CurveQuery:
@@ -89,7 +88,7 @@ class CurvesView(StudyView[CurvesQuestion, CurveQuery, Curves]):
 
     def check(self, study: Study, chosen: CurveQuery) -> None:
         """The axes and the results."""
-        select(study, models.study_results(study), chosen)
+        select(study, chosen)
 
     def small(self, study: Study, chosen: CurveQuery) -> bool:
         """By the numbers of the curves."""
@@ -176,7 +175,7 @@ class MapView(StudyView[MapQuestion, tuple[CurveQuery, bool], Map]):
     def check(self, study: Study, chosen: tuple[CurveQuery, bool]) -> None:
         """The axes and the result."""
         query, _ = chosen
-        check_map(study, models.study_results(study), query.x, query.by[0], query.y[0], query.at)
+        check_map(study, query.x, query.by[0], query.y[0], query.at)
 
     def small(self, study: Study, chosen: tuple[CurveQuery, bool]) -> bool:
         """By the numbers of the map."""

@@ -69,7 +69,7 @@ class _OfDrives:
         """The axes, the results, and what a good drive reaches first."""
         infos = models.study_results(study)
         axes = {"": [(axis.paths[0], axis_name(study, axis.paths[0])) for axis in varying_axes(study)]}
-        main, y = main_query(study, infos), judged_by(study, drawn_results(study, infos))
+        main, y = main_query(study), judged_by(study, drawn_results(study))
         return {
             "x": Offered((main.x,) if main else (), groups=axes, left_out=main is None),
             "by": Offered(groups=axes, left_out=len(axes[""]) < 2),
@@ -98,7 +98,7 @@ class RibbonView(_OfDrives, StudyView[RibbonQuestion, RibbonQuery, Ribbon]):
         """The results and the axes."""
         infos = models.study_results(study)
         numeric_results(infos, "y", chosen.y)
-        places_of(study, infos, chosen.asked)
+        places_of(study, chosen.asked)
 
     def small(self, study: Study, chosen: RibbonQuery) -> bool:
         """By the cases of the study."""
@@ -107,9 +107,8 @@ class RibbonView(_OfDrives, StudyView[RibbonQuestion, RibbonQuery, Ribbon]):
     def find(self, library: Library, study_id: str, chosen: RibbonQuery, *, drawn: bool = False) -> Ribbon:
         """The ribbons; SelectionError as of `ribbon`."""
         study = library.store.studies.study(study_id)
-        infos = models.study_results(study)
         fetch = partial(library.store.rows.for_cases, study_id)
-        return ribbon(study, infos, chosen.y or drawn_results(study, infos), chosen.asked, chosen.quantiles, fetch)
+        return ribbon(study, chosen.y or drawn_results(study), chosen.asked, chosen.quantiles, fetch)
 
     def json(self, answer: StudyAnswer[RibbonQuery, Ribbon]) -> m.RibbonReport:
         """The ribbons as JSON data."""
@@ -145,7 +144,7 @@ class YieldView(_OfDrives, StudyView[YieldQuestion, YieldQuery, Yield]):
         """The conditions and the axes."""
         infos = models.study_results(study)
         read_conditions(infos, chosen.conditions)
-        places_of(study, infos, chosen.asked)
+        places_of(study, chosen.asked)
 
     def small(self, study: Study, chosen: YieldQuery) -> bool:
         """By the cases of the study."""
@@ -155,7 +154,7 @@ class YieldView(_OfDrives, StudyView[YieldQuestion, YieldQuery, Yield]):
         """The yields; SelectionError as of `yields`."""
         study = library.store.studies.study(study_id)
         fetch = partial(library.store.rows.for_cases, study_id)
-        return yields(study, models.study_results(study), chosen.conditions, chosen.asked, chosen.worst, fetch)
+        return yields(study, chosen.conditions, chosen.asked, chosen.worst, fetch)
 
     def json(self, answer: StudyAnswer[YieldQuery, Yield]) -> m.YieldReport:
         """The yields as JSON data."""

@@ -131,16 +131,16 @@ def _found(
         return search_headline(library.fronts.of(study_id, exact=False), over=record.over)
     if kind == "measured":
         return calibrated_headline(library.calibrations.of(study_id))
-    infos, fetch = models.study_results(study), partial(library.store.rows.for_cases, study_id)
+    fetch = partial(library.store.rows.for_cases, study_id)
     if kind == "tolerances" and study.plan is None and query is None:
-        return batch_headline(study, infos, asked_like(usual_query(library, study_id)), point, fetch)
+        return batch_headline(study, asked_like(usual_query(library, study_id)), point, fetch)
     mapped = map_plan(study)
     if mapped is not None and query is None:
         return _of_map(study, mapped, fetch(np.arange(study.cases, dtype=np.int64), mapped.results))
-    asked = answers_query(study, infos, query or usual_query(library, study_id))
+    asked = answers_query(study, query or usual_query(library, study_id))
     whole = partial(whole_columns, library, study_id) if asked is None and study.cases > 1 else None
-    found = find_answers(study, infos, asked, point if asked is not None else None, fetch, whole)
-    told = along_headline(study, infos, found, curve, asked=bool(point))
+    found = find_answers(study, asked, point if asked is not None else None, fetch, whole)
+    told = along_headline(study, found, curve, asked=bool(point))
     if study.sweep is not None and found.drawn is not None and (text := hysteresis(found.drawn)):
         told = replace(told, sentence=(*told.sentence[:1], joined("", [text])))
     return told
@@ -177,12 +177,11 @@ def usual_query(library: Library, study_id: str) -> CurveQuery | None:
     """The curves that are shown first; where they have no finished case, held where there are finished cases."""
     store = library.store
     study = store.studies.study(study_id)
-    infos = models.study_results(study)
-    query = characteristic(study, infos)
+    query = characteristic(study)
     if query is None or not query.at or store.studies.get(study_id).state is StudyState.FINISHED:
         return query
     try:
-        cases = [line.cases for line in select(study, infos, query).lines]
+        cases = [line.cases for line in select(study, query).lines]
     except SelectionError:
         return query
     found = store.rows.for_cases(study_id, np.concatenate(cases), ())

@@ -20,7 +20,6 @@ from sprag_study.service.storage.errors import StoreError
 from sprag_study.service.views.headline import headline_of, is_small
 from sprag_study.service.views.library import reading_of
 from sprag_study.service.views.relatives import asked_by
-from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -95,7 +94,7 @@ def about(study: Study) -> Phrase:
         return Phrase(_CALIBRATION)
     if asked == "tolerances":
         return Phrase(_BATCH)
-    query = characteristic(study, models.study_results(study))
+    query = characteristic(study)
     if query is None:
         return Phrase("")
     return Phrase("{name} along {path}", name=Name(query.y[0], within=True), path=Name(query.x, within=True))

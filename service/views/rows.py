@@ -50,7 +50,7 @@ def goal_order(study: Study) -> str:
             return "rank" if plan.best else "violation"
         return f"{'-' if plan.best[0].max else ''}{plan.best[0].name}"
     infos = models.study_results(study)
-    name = judged_by(study, drawn_results(study, infos))
+    name = judged_by(study, drawn_results(study))
     if (info := result_of(infos, name)) is None or info.kind == "category":
         return "case"
     rising = models.presentation_of(study).is_best_small(name) is (study.spread is None)

@@ -59,7 +59,7 @@ class SensitivityView(StudyView[SensitivityQuestion, tuple[str, ...], list[Sensi
     def offered(self, study: Study) -> dict[str, Offered]:
         """The results that are numbers; first those that are drawn."""
         infos = models.study_results(study)
-        return {"y": Offered(drawn_results(study, infos)[:MOST_RESULTS], groups=named(numeric_names(infos)))}
+        return {"y": Offered(drawn_results(study)[:MOST_RESULTS], groups=named(numeric_names(infos)))}
 
     def find(
         self, library: Library, study_id: str, chosen: tuple[str, ...], *, drawn: bool = False

@@ -14,7 +14,6 @@ from sprag_study.service.jobs.local import run_here
 from sprag_study.service.results.curve_cases import draw, select
 from sprag_study.service.results.defaults import main_query
 from sprag_study.service.spec.document import parse_spec
-from sprag_study.worker import models
 from sprag_study.worker.planning import planner_of
 from sprag_study.worker.planning.curves import Why
 
@@ -39,10 +38,9 @@ def test_the_example_of_the_guide_has_its_numbers() -> None:
     assert f"at most {planner.most_cases} cases in at most {planner.most_rounds} rounds" in page
     with run_here(parsed.spec, parsed.study, processes=0) as done:
         study = done.store.studies.study(done.record.id)
-        infos = models.study_results(study)
-        query = main_query(study, infos)
+        query = main_query(study)
         assert query is not None
-        drawn = draw(select(study, infos, query), partial(done.store.rows.for_cases, done.record.id))
+        drawn = draw(select(study, query), partial(done.store.rows.for_cases, done.record.id))
     (told,) = re.findall(r"needs (\d+)\s+cases", page)
     assert study.cases == pytest.approx(int(told), rel=0.05)
     sentence = page.split("\n> ")[1].split(" (")[0]

@@ -283,6 +283,11 @@ def study_results(study: Study) -> tuple[ResultInfo, ...]:
     return result_infos(study.model, variant_of(study))
 
 
+def results_by_name(study: Study) -> dict[str, ResultInfo]:
+    """Every result of the cases of ``study`` by its name."""
+    return {info.name: info for info in study_results(study)}
+
+
 def regime_info(infos: Sequence[ResultInfo]) -> ResultInfo | None:
     """The result that gives the kind of motion; None where there is none.
 

@@ -66,7 +66,7 @@ def has_rows(given: QueryParams) -> bool:
 
 def condition_texts(given: QueryParams, study: Study, reading: Reading) -> list[str]:
     """The conditions of the rows of a form. Bare numbers are in the shown units."""
-    infos = {info.name: info for info in models.study_results(study)}
+    infos = models.results_by_name(study)
     found = []
     for name, relation, typed, part in zip_longest(*map(given.getlist, _FIELDS), fillvalue=""):
         if not name.strip() or not typed.strip():

@@ -202,12 +202,11 @@ def _page(
     frame: dict[str, Any], study_id: str, study: Study, case: int, which: int | None,
     opened: list[tuple[Asked, Seen | None]], status: int, values: dict[str, Any],
 ) -> Response:  # fmt: skip
-    infos, row = models.study_results(study), values["row"]
+    known, row = models.results_by_name(study), values["row"]
     reading = frame["reading"]
     own, address = f"/studies/{study_id}/cases/{case}", f"{study_address(study_id)}/cases/{case}"
     only = [] if which is None else [("start", str(which))]
-    known = {info.name: info for info in infos}
-    main = [known[name] for name in main_results(study, infos)]
+    main = [known[name] for name in main_results(study)]
     flags = meanings(models.flags_of(study.model))
     files = [
         files_of(f"{address}/{asked.about.name}", asked, [*(only if asked.about.starts else []), *_languages(asked)])
@@ -231,7 +230,7 @@ def _page(
         parameters=_parameters(study, case, reading),
         main=main,
         main_facts=[] if row is None else [fact_of(_number(info, row), reading) for info in main[:MOST]],
-        infos=infos,
+        infos=known.values(),
         shown=models.presentation_of(study),
         settled=models.is_settled(study.run),
         extent=models.extent(study, case),
@@ -269,11 +268,11 @@ def _said(study: Study, row: CaseRow) -> list[str]:
     """What a case does, or how it ended; and its settled motion where it has one that no flag explains."""
     if row.ending != models.OK:
         return [Phrase(models.ENDING_SENTENCES[row.ending])]
-    infos = {info.name: info for info in models.study_results(study)}
+    infos = models.results_by_name(study)
     values = {name: value for name in infos if isinstance(value := row.results[name], float)}
     widths = {name: values[width] for name in values if values.get(width := models.half_width(name), 0.0) > 0.0}
-    main = main_results(study, list(infos.values()))
-    said: list[Part] = [Whole(told(study, infos, {name: values[name] for name in main if name in values}, widths))]
+    main = main_results(study)
+    said: list[Part] = [Whole(told(study, {name: values[name] for name in main if name in values}, widths))]
     regime, order = row.results.get("regime"), row.results.get(ORDER)
     if isinstance(regime, str) and regime not in row.flags:
         said.append(motion_sentence(regime, order if isinstance(order, int) else None))

@@ -11,7 +11,6 @@ from sprag_study.service.reading.reader import Choice, reading_for
 from sprag_study.service.report.chosen_figures import chosen_figures
 from sprag_study.service.results.curve_cases import draw, select
 from sprag_study.service.results.defaults import main_query
-from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from sprag_study.service.storage.store import Store
@@ -23,13 +22,12 @@ def small_curve(store: Store, study_id: str, units: str) -> bytes | None:
     Raises StudyNotFoundError, and SelectionError for curves that cannot be drawn.
     """
     study, choice = store.studies.study(study_id), Choice(units)
-    infos = models.study_results(study)
     chosen = next((figure for figure in chosen_figures(store, study_id, choice) if figure.shown is not None), None)
     if chosen is not None:
         return chosen.draw("png", chosen.name)
-    query = main_query(study, infos)
+    query = main_query(study)
     if query is None:
         return None
     fetch = partial(store.rows.for_cases, study_id)
-    drawn = draw(select(study, infos, replace(query, y=query.y[:1])), fetch)
+    drawn = draw(select(study, replace(query, y=query.y[:1])), fetch)
     return draw_curves(drawn, "", "png", reading_for(study, store.studies.spec(study_id), choice))

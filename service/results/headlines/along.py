@@ -58,7 +58,6 @@ class Along:
     """
 
     study: Study
-    infos: Mapping[str, ResultInfo]
     curve: Curve
     path: str
     x: float
@@ -67,7 +66,7 @@ class Along:
     @property
     def first(self) -> ResultInfo:
         """The result that a case is judged by."""
-        return self.infos[judged_by(self.study, self.curve.y)]
+        return models.results_by_name(self.study)[judged_by(self.study, self.curve.y)]
 
     def value(self, place: int, name: str) -> float:
         """A result that counts; NaN where there is none."""
@@ -94,11 +93,9 @@ def wanted_of(study: Study, name: str, parameters: Mapping[str, float | str] | N
     return value if isinstance(value, float) and np.isfinite(value) else None
 
 
-def told(
-    study: Study, infos: Mapping[str, ResultInfo], values: Mapping[str, float], widths: Mapping[str, float]
-) -> Phrase:
+def told(study: Study, values: Mapping[str, float], widths: Mapping[str, float]) -> Phrase:
     """The clause about a case with these results; "" where none can be said."""
-    clauses = models.presentation_of(study).clauses
+    clauses, infos = models.presentation_of(study).clauses, models.results_by_name(study)
     names = {place: name for place, name in clauses.results.items() if name in infos}
     parts: dict[str, Part] = {
         place: amount(infos[name], values[name], widths.get(name))
@@ -143,23 +140,21 @@ def place_on(curve: Curve, name: str, x: float | None, *, asked: bool) -> tuple[
     return float(values[nearest]), (int(run[nearest]),)
 
 
-def along_headline(
-    study: Study, infos: Sequence[ResultInfo], found: StudyAnswers, name: str = "", *, asked: bool = False
-) -> Headline:
+def along_headline(study: Study, found: StudyAnswers, name: str = "", *, asked: bool = False) -> Headline:
     """The answer of a curve at the point of ``found``, the nearest case of it unless that was ``asked`` for.
 
     The curve with the ``name`` that it has in pictures; by default it is that nearest to the machine of the base.
     """
     if found.query is None or found.drawn is None or not found.curves:
-        return _no_curve(study, infos, found)
+        return _no_curve(study, found)
     place = curve_place(study, found, name)
     curve = found.drawn.curves[place]
     spot = place_on(curve, judged_by(study, curve.y), found.point, asked=asked)
     of = curve_of(study, curve.line)
     if spot is None:
         return Headline(of=of)
-    own = Along(study, {info.name: info for info in infos}, curve, found.query.x, *spot)
-    answers = answers_at(study, infos, found, place, spot[0])
+    own = Along(study, curve, found.query.x, *spot)
+    answers = answers_at(study, found, place, spot[0])
     gap = None
     if len(spot[1]) == 2:
         low, high = (float(curve.line.x[at]) for at in spot[1])
@@ -237,11 +232,11 @@ def case_sentence(own: Along, place: int) -> Phrase:
 
 
 def _clause(own: Along, place: int) -> Phrase:
-    values = {name: own.value(place, name) for name in own.curve.y if name in own.infos and not name.endswith(_WIDTH)}
+    values = {name: own.value(place, name) for name in own.curve.y if not name.endswith(_WIDTH)}
     widths = {name: width for name in values if (width := _width(own, place, name)) is not None}
     first = own.first.name
     values = {first: values[first], **values}
-    return NOTHING if not np.isfinite(values[first]) else told(own.study, own.infos, values, widths)
+    return NOTHING if not np.isfinite(values[first]) else told(own.study, values, widths)
 
 
 def _width(own: Along, place: int, name: str) -> float | None:
@@ -345,14 +340,13 @@ def _stall(found: Found) -> KeyNumber:
     return KeyNumber(found.answer.title, found.value, found.unit, OF_PLACES, above=True, where=there, case=found.case)
 
 
-def _no_curve(study: Study, infos: Sequence[ResultInfo], found: StudyAnswers) -> Headline:
+def _no_curve(study: Study, found: StudyAnswers) -> Headline:
     """The answer of a single case, or the extremes among cases that lie on no curve."""
-    known = {info.name: info for info in infos}
     if found.curves:
         one = found.curves[0]
         values = {item.info.name: item.value for item in (*one.working_point, *one.answers) if item.value is not None}
         widths = {item.info.name: item.half_width for item in one.working_point if item.half_width}
-        clause = told(study, known, values, widths)
+        clause = told(study, values, widths)
         numbers = [_plain(item) for item in (*one.answers, *one.working_point) if item.value is not None]
         numbers = list({number.label: number for number in numbers}.values())
         says = (joined("", [Whole(clause)]),) if clause else ()

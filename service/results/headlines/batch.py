@@ -32,14 +32,11 @@ from sprag_study.worker.spread import DRIVE
 from sprag_study.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from sprag_study.service.results.curves import CurveQuery, Fetch
     from sprag_study.service.results.refined import Line
     from sprag_study.service.results.tolerances.batch import Places
     from sprag_study.service.results.tolerances.ribbons import Ribbon, RibbonLine
     from sprag_study.service.results.tolerances.yields import Yield, YieldLine
-    from sprag_study.worker.models import ResultInfo
     from sprag_study.worker.study import Study
 
 _YIELD: Final = Phrase("Yield")
@@ -54,15 +51,13 @@ def asked_like(query: CurveQuery | None) -> Asked:
     return Asked(query.x, tuple(path for path in query.by if path != DRIVE), at)
 
 
-def batch_headline(
-    study: Study, infos: Sequence[ResultInfo], asked: Asked, point: str | None, fetch: Fetch
-) -> Headline:
+def batch_headline(study: Study, asked: Asked, point: str | None, fetch: Fetch) -> Headline:
     """The answer of a batch at a value of its axis, the usual one unless a ``point`` is given.
 
     Raises SelectionError about ``point`` where it is no value of the axis.
     """
-    name = judged_by(study, drawn_results(study, infos))
-    found = ribbon(study, infos, (name,), asked, QUANTILES, fetch)
+    name = judged_by(study, drawn_results(study))
+    found = ribbon(study, (name,), asked, QUANTILES, fetch)
     line, place = min(found.lines, key=lambda one: from_base(study, one.line.by)), 0
     gap, off = None, NOTHING
     if found.places.x is not None:
@@ -72,7 +67,7 @@ def batch_headline(
             off = beyond(study, found.places.x, x, line.line.x[place])
     if not line.spreads[name].quantiles.drives[place]:
         return Headline(gap=gap)
-    reached = yields(study, infos, (first_condition(study, name),), asked, 0, fetch)
+    reached = yields(study, (first_condition(study, name),), asked, 0, fetch)
     return Headline(
         tuple(filter(None, (off, *_sentences(found, line, name, place, gap)))),
         _numbers(found, line, name, place, reached),

@@ -24,7 +24,6 @@ from sprag_study.worker.spread import DRIVE
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag_study.worker.models import ResultInfo
     from sprag_study.worker.study import Study
 
     Numbers = NDArray[np.float64]
@@ -58,7 +57,6 @@ class Places:
     """
 
     study: Study
-    infos: tuple[ResultInfo, ...]
     x: str | None
     units: dict[str, str]
     names: dict[str, str]
@@ -84,7 +82,7 @@ class Rows:
     done: NDArray[np.bool_]
 
 
-def places_of(study: Study, infos: Sequence[ResultInfo], asked: Asked) -> Places:
+def places_of(study: Study, asked: Asked) -> Places:
     """The places of a study with tolerances.
 
     Raises
@@ -99,10 +97,10 @@ def places_of(study: Study, infos: Sequence[ResultInfo], asked: Asked) -> Places
     for parameter, paths in (("x", (asked.x,)), ("by", asked.by), ("at", [path for path, _ in asked.at])):
         if DRIVE in paths:
             raise refused(parameter, "not-an-axis", "every drive counts", DRIVE, allowed="another axis")
-    asked = _completed(study, infos, asked)
+    asked = _completed(study, asked)
     nominal = (*asked.at, (DRIVE, "0"))
     if asked.x is not None:
-        chosen = select(study, infos, CurveQuery(asked.x, (infos[0].name,), asked.by, nominal))
+        chosen = select(study, CurveQuery(asked.x, tuple(models.results_by_name(study))[:1], asked.by, nominal))
         x, lines = asked.x, chosen.lines
     else:
         x, lines = None, (_single(study, nominal),)
@@ -110,7 +108,6 @@ def places_of(study: Study, infos: Sequence[ResultInfo], asked: Asked) -> Places
     paths = [*([x] if x else []), *lines[0].by, *lines[0].at]
     return Places(
         study,
-        tuple(infos),
         x,
         {path: unit_of(study, path) for path in paths},
         {path: axis_name(study, path) for path in paths},
@@ -119,12 +116,12 @@ def places_of(study: Study, infos: Sequence[ResultInfo], asked: Asked) -> Places
     )
 
 
-def _completed(study: Study, infos: Sequence[ResultInfo], asked: Asked) -> Asked:
+def _completed(study: Study, asked: Asked) -> Asked:
     """The request with an x where it has none and an axis is open; then other open axes have their usual values."""
     if asked.x is not None:
         return asked
     taken = {study.axis_of(path) for path in (*asked.by, *(path for path, _ in asked.at))}
-    main = main_query(study, infos)
+    main = main_query(study)
     if main is None:
         return asked
     roles = [path for path in (main.x, *main.by) if path != DRIVE and study.axis_of(path) not in taken]
@@ -149,7 +146,7 @@ def _single(study: Study, at: Sequence[tuple[str, str]]) -> Line:
 def read(places: Places, line: Line, names: Sequence[str], fetch: Fetch) -> Iterator[Rows]:
     """The rows of a line, some places at a time, so that memory does not grow with the number of places."""
     drives = places.study.drives + 1
-    regime, needed = models.regime_info(places.infos), list(dict.fromkeys(names))
+    regime, needed = models.regime_info(models.study_results(places.study)), list(dict.fromkeys(names))
     at_once = max(BLOCK_CASES // drives, 1)
     for first in range(0, line.cases.size, at_once):
         part = slice(first, min(first + at_once, line.cases.size))

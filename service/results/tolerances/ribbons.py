@@ -17,6 +17,7 @@ from sprag_study.service.results.selection import numeric_results
 from sprag_study.service.results.tolerances.batch import Asked, Places, Rows, places_of, read
 from sprag_study.service.results.tolerances.causes import Causes, Matrix, causes_of
 from sprag_study.service.results.tolerances.quantiles import Quantiles, quantiles
+from sprag_study.worker import models
 from sprag_study.worker.limits import MAX_CURVE_VALUES
 
 if TYPE_CHECKING:
@@ -92,16 +93,15 @@ class Ribbon:
 
 def ribbon(
     study: Study,
-    infos: Sequence[ResultInfo],
     names: Sequence[str],
     asked: Asked,
     probabilities: Sequence[float],
     fetch: Fetch,
 ) -> Ribbon:
     """The ribbons of results; raises SelectionError as `places_of` does, and for an unknown result."""
-    results = numeric_results(infos, "y", names)
+    results = numeric_results(models.study_results(study), "y", names)
     wanted = tuple(sorted(set(probabilities)))
-    places = places_of(study, infos, asked)
+    places = places_of(study, asked)
     numbers = sum(line.cases.size for line in places.lines) * len(results) * (3 * len(wanted) + 1)
     if numbers > MAX_CURVE_VALUES:
         message = Sentence("{count} numbers are requested; select fewer places with at=", count=str(numbers))

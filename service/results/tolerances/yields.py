@@ -20,7 +20,6 @@ from sprag_study.worker import models
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag_study.worker.models import ResultInfo
     from sprag_study.worker.study import Study
 
     Numbers = NDArray[np.float64]
@@ -86,22 +85,20 @@ class Yield:
     lines: tuple[YieldLine, ...]
 
 
-def yields(
-    study: Study, infos: Sequence[ResultInfo], conditions: Sequence[str], asked: Asked, worst: int, fetch: Fetch
-) -> Yield:
+def yields(study: Study, conditions: Sequence[str], asked: Asked, worst: int, fetch: Fetch) -> Yield:
     """The yield of conditions, with so many of the worst drives of each line.
 
     Raises SelectionError as `places_of` and `read_conditions` do.
     """
-    wanted = read_conditions(infos, conditions)
-    places = places_of(study, infos, asked)
+    wanted = read_conditions(models.study_results(study), conditions)
+    places = places_of(study, asked)
     return Yield(places, wanted, tuple(_line(places, line, wanted, worst, fetch) for line in places.lines))
 
 
 def _line(places: Places, line: Line, conditions: tuple[Condition, ...], worst: int, fetch: Fetch) -> YieldLine:
     count, drives = line.cases.size, places.study.drives
     names = list(dict.fromkeys(condition.info.name for condition in conditions))
-    fetched = models.with_half_widths(names, (info.name for info in places.infos))
+    fetched = models.with_half_widths(names, models.results_by_name(places.study))
     reached, run, failed, pending = (np.zeros(count, dtype=np.int64) for _ in range(4))
     nominal = np.zeros(count, dtype=np.bool_)
     whole = _Whole(drives, names)

@@ -39,7 +39,7 @@ def test_a_failed_case_has_no_place_in_a_figure(spec: dict[str, Any]) -> None:
         known = fetch(cases, names)
         return CaseColumns(known.cases, ["ok", "unstable_motion", "ok"], known.values)
 
-    chosen = select(study, models.study_results(study), CurveQuery("shaft.load", (SPEED,)))
+    chosen = select(study, CurveQuery("shaft.load", (SPEED,)))
     (panel,) = curves_figure([("", draw(chosen, failed))]).panels
     assert np.array_equal(panel.lines[0].y, [0.0, np.nan, 2.0], equal_nan=True)
 

@@ -15,7 +15,6 @@ from sprag_study.service.figures.svg import picture_svg
 from sprag_study.service.figures.svg_map import picture_map
 from sprag_study.service.results.curve_cases import draw, draw_map, select
 from sprag_study.service.results.curves import CurveQuery, Curves, Map
-from sprag_study.worker import models
 from tests.service.figures.seen import seen
 from tests.service.results.test_regimes import ORDERS, REGIMES, fetched, study
 
@@ -26,13 +25,13 @@ SPEED = "shaft.speed.mean"
 def curves(lines: int = 1, y: tuple[str, ...] = (SPEED,)) -> Curves:
     one = study(8, lines)
     by = ("excitation.frequency",) if lines > 1 else ()
-    return draw(select(one, models.study_results(one), CurveQuery("shaft.load", y, by)), fetched)
+    return draw(select(one, CurveQuery("shaft.load", y, by)), fetched)
 
 
 def order_of_two() -> Map:
     two = study(8, 2)
     axes = "shaft.load", "excitation.frequency", "regime.order"
-    return draw_map(two, models.study_results(two), *axes, (), fetched)
+    return draw_map(two, *axes, (), fetched)
 
 
 def test_a_motion_is_named_by_its_periods_or_its_regime() -> None:

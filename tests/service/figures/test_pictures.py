@@ -17,7 +17,6 @@ from sprag_study.service.results.curve_cases import draw, draw_map, select
 from sprag_study.service.results.curves import CurveQuery
 from sprag_study.service.spec.document import parse_spec
 from sprag_study.service.storage.studies.records import CaseColumns
-from sprag_study.worker import models
 from tests.service.figures.seen import Seen, seen
 
 if TYPE_CHECKING:
@@ -35,7 +34,7 @@ def fetch(cases: NDArray[np.int64], names: Any) -> CaseColumns:
 def curves(spec: dict[str, Any], *y: str, by: tuple[str, ...] = (), at: tuple[tuple[str, str], ...] = ()) -> Seen:
     study = parse_spec(spec).study
     query = CurveQuery("shaft.load", y or (SPEED,), by, at)
-    drawn = draw(select(study, models.study_results(study), query), fetch)
+    drawn = draw(select(study, query), fetch)
     return seen(draw_curves(drawn, "A study", "svg", Reading(study.model)))
 
 
@@ -70,9 +69,7 @@ def test_each_of_many_curves_has_its_colour_in_a_scale(spec: dict[str, Any]) -> 
 
 def test_long_names_of_panels_have_several_lines(spec: dict[str, Any]) -> None:
     study = parse_spec({**spec, "axes": [{"path": "shaft.load", "values": [0, 1]}]}).study
-    figure = curves_figure(
-        [("", draw(select(study, models.study_results(study), CurveQuery("shaft.load", (SPEED,))), fetch))]
-    )
+    figure = curves_figure([("", draw(select(study, CurveQuery("shaft.load", (SPEED,))), fetch))])
     long = replace(figure, panels=(replace(figure.panels[0], y=Quantity("word " * 40, "m")),) * 12)
     found = seen(draw_figure(long, "", "svg", paper=True))
     lines = [text for text in found.texts if text.startswith("word")]
@@ -90,7 +87,7 @@ def test_listed_points_of_one_machine_are_joined_in_order(spec: dict[str, Any]) 
 def test_the_outer_cells_of_a_map_are_whole(spec: dict[str, Any]) -> None:
     study = parse_spec(grid(spec, 4)).study
     at = (("excitation.amplitude_x", "2 mm"),)
-    made = draw_map(study, models.study_results(study), "shaft.load", "excitation.frequency", SPEED, at, fetch)
+    made = draw_map(study, "shaft.load", "excitation.frequency", SPEED, at, fetch)
     drawn = paint_map(read_map(made, Reading(study.model)), "A study", "svg").decode()
     assert 'data-x="-0.05 2.35 ' in drawn
     assert 'data-y="17.5 37.5 ' in drawn
@@ -104,6 +101,6 @@ def test_cases_without_a_result_are_grey(spec: dict[str, Any]) -> None:
 
     spec["axes"] = [{"path": "shaft.load", "values": [0, 1]}, {"path": "excitation.frequency", "values": [25]}]
     study = parse_spec(spec).study
-    made = draw_map(study, models.study_results(study), "shaft.load", "excitation.frequency", SPEED, (), nothing)
+    made = draw_map(study, "shaft.load", "excitation.frequency", SPEED, (), nothing)
     assert seen(paint_map(made, "", "svg")).has("2 cases without a result")
     assert paint_map(made, "", "png").startswith(b"\x89PNG")

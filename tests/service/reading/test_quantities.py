@@ -88,8 +88,7 @@ def test_every_offered_unit_is_that_of_a_conversion_by_hand() -> None:
 
 def test_picture_and_table_show_one_number_in_one_unit() -> None:
     study, spec = study_of()
-    infos = models.study_results(study)
-    curves = draw(select(study, infos, CurveQuery("shaft.load", (SPEED,), ("excitation.frequency",))), fetch)
+    curves = draw(select(study, CurveQuery("shaft.load", (SPEED,), ("excitation.frequency",))), fetch)
     read = reading_for(study, spec, CHOICE)
     figure = read_figure(curves_figure([("", curves)]), read)
     wanted = [(10.0 + case) * 60.0 / (2.0 * math.pi) for case in (0, 2, 4)]
@@ -139,7 +138,7 @@ def test_files_of_all_rows_have_the_chosen_units(service: Service, form: str) ->
 
 def test_a_map_has_the_units_of_curves() -> None:
     study, spec = study_of()
-    drawn = draw_map(study, models.study_results(study), "shaft.load", "excitation.frequency", SPEED, (), fetch)
+    drawn = draw_map(study, "shaft.load", "excitation.frequency", SPEED, (), fetch)
     read = read_map(drawn, reading_for(study, spec, CHOICE))
     np.testing.assert_allclose(read.y_values, [1200.0, 1500.0], rtol=1e-13)
     np.testing.assert_allclose(read.values[0][0], 10.0 * 30.0 / math.pi, rtol=1e-13)

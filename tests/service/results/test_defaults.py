@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 from sprag_study.service.results.curve_cases import select
 from sprag_study.service.results.defaults import caption, drawn_numbers, main_query
 from sprag_study.service.spec.document import parse_spec
-from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from sprag_study.service.results.curves import CurveQuery
@@ -16,10 +15,9 @@ if TYPE_CHECKING:
 def query_of(spec: dict[str, Any], **changes: Any) -> CurveQuery | None:
     """The main curve of a changed spec, which can be selected."""
     study = parse_spec({**spec, **changes}).study
-    infos = models.study_results(study)
-    query = main_query(study, infos)
+    query = main_query(study)
     if query is not None:
-        assert select(study, infos, query).lines
+        assert select(study, query).lines
     return query
 
 
@@ -62,7 +60,7 @@ def test_some_of_many_values_always_include_that_of_the_base(spec: dict[str, Any
     assert query is not None
     assert ("excitation.frequency", "25.0") in query.of
     study = parse_spec({**spec, "axes": axes}).study
-    lines = select(study, models.study_results(study), query).lines
+    lines = select(study, query).lines
     assert [repr(line.by["excitation.frequency"]) for line in lines] == [value for _, value in query.of]
     assert drawn_numbers(study, query) == 6 * 5
 

@@ -49,7 +49,7 @@ def schedule(**fields: object) -> Callable[[], object]:
         (lambda: numeric_results(INFOS, "y", ["efficiencz"]), "unknown result; did you mean 'efficiency'?",
          "невідомий результат; можливо, мається на увазі 'efficiency'?", ""),
         (
-            lambda: select(STUDY, INFOS, CurveQuery("shaft.load", ("efficiency",))),
+            lambda: select(STUDY, CurveQuery("shaft.load", ("efficiency",))),
             "the axis excitation.frequency is left open: name it in by=, or give its value as "
             "at=excitation.frequency=VALUE",
             "вісь excitation.frequency залишено відкритою: назвіть її в by= або задайте її значення як "

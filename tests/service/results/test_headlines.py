@@ -14,7 +14,6 @@ from sprag_study.service.reading.reader import Reading
 from sprag_study.service.results.headlines.along import along_headline
 from sprag_study.service.results.headlines.headline import digits
 from sprag_study.service.results.key_answers import answers_query, find_answers
-from sprag_study.worker import models
 from tests.service.results.test_key_answers import Rows, study_of
 
 READING = Reading("vibration-drive", Units({"rad/s": "rpm", "1": "%"}))
@@ -24,9 +23,9 @@ def headline_of(
     spec: dict[str, Any], point: str | None = None, flags: dict[int, str] | None = None, **changes: Any
 ) -> Any:
     study = study_of(spec, **changes)
-    infos, rows = models.study_results(study), Rows(study, flags)
-    found = find_answers(study, infos, answers_query(study, infos), point, rows, rows.whole)
-    return along_headline(study, infos, found, asked=bool(point))
+    rows = Rows(study, flags)
+    found = find_answers(study, answers_query(study), point, rows, rows.whole)
+    return along_headline(study, found, asked=bool(point))
 
 
 def numbers_of(headline: Any) -> dict[str, str]:
@@ -107,9 +106,9 @@ def test_digits_follow_the_interval(value: float, half_width: float | None, coun
 
 def test_a_missing_mean_is_never_a_number(spec: dict[str, Any]) -> None:
     study = study_of(spec)
-    infos, rows = models.study_results(study), Rows(study)
+    rows = Rows(study)
     rows.values["shaft.speed.mean"] = np.full(study.cases, np.nan)
-    found = find_answers(study, infos, answers_query(study, infos), None, rows, None)
-    headline = along_headline(study, infos, replace(found))
+    found = find_answers(study, answers_query(study), None, rows, None)
+    headline = along_headline(study, replace(found))
     assert "no result" in headline.said(READING)
     assert all(one.label != "No-load speed" for one in headline.numbers)

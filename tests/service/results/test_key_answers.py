@@ -74,8 +74,7 @@ def study_of(spec: dict[str, Any], **changes: Any) -> Study:
 
 
 def found_in(study: Study, rows: Rows, point: str | None = None) -> StudyAnswers:
-    infos = models.study_results(study)
-    return find_answers(study, infos, answers_query(study, infos), point, rows, rows.whole)
+    return find_answers(study, answers_query(study), point, rows, rows.whole)
 
 
 def only(found: StudyAnswers) -> dict[str, Found]:
@@ -208,16 +207,16 @@ def test_answers_stand_on_their_lines(spec: dict[str, Any]) -> None:
 def test_chosen_curves_and_wrong_choices(spec: dict[str, Any]) -> None:
     frequencies = {"path": "excitation.frequency", "linspace": ["20 Hz", "30 Hz", 11]}
     study = study_of(spec, axes=[frequencies, {"path": "shaft.load", "values": LOADS}])
-    infos, of = models.study_results(study), (("excitation.frequency", "22 Hz"), ("excitation.frequency", "21"))
+    of = (("excitation.frequency", "22 Hz"), ("excitation.frequency", "21"))
     query = CurveQuery("shaft.load", ("torque.mean",), ("excitation.frequency",), of=of)
-    found = find_answers(study, infos, answers_query(study, infos, query), None, Rows(study))
+    found = find_answers(study, answers_query(study, query), None, Rows(study))
     assert [one.line.by["excitation.frequency"] for one in found.curves] == [21.0, 22.0]
     with pytest.raises(SelectionError) as caught:
-        find_answers(study, infos, query, "3 mm", Rows(study))
+        find_answers(study, query, "3 mm", Rows(study))
     assert caught.value.faults[0].where == "point"
     for point in (None, "3 mm"):
         with pytest.raises(SelectionError) as caught:
-            find_answers(study, infos, replace(query, x="shaft.lod"), point, Rows(study))
+            find_answers(study, replace(query, x="shaft.lod"), point, Rows(study))
         assert (caught.value.faults[0].where, caught.value.faults[0].code) == ("x", "not-an-axis")
 
 
@@ -228,9 +227,8 @@ def test_one_machine_has_the_results_of_its_case(spec: dict[str, Any]) -> None:
         values = {name: np.full(1, 0.25 if name == "efficiency" else np.nan) for name in names}
         return CaseColumns(cases, ["ok"], values, ["windup_out_of_data"])
 
-    infos = models.study_results(study)
-    assert answers_query(study, infos) is None
-    (curve,) = find_answers(study, infos, None, None, fetch).curves
+    assert answers_query(study) is None
+    (curve,) = find_answers(study, None, None, fetch).curves
     values = {item.answer.name: (item.value, item.why) for item in curve.working_point}
     assert values["efficiency"] == (0.25, None)
     assert values["torque.mean"] == (None, "no-result")

@@ -19,7 +19,6 @@ from sprag_study.service.results.defaults import completed, main_query, no_curve
 from sprag_study.service.results.key_answers import answers_query, find_answers
 from sprag_study.service.spec.document import parse_spec
 from sprag_study.service.storage.studies.records import CaseColumns
-from sprag_study.worker import models
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -44,8 +43,8 @@ def results_of(study: Study, cases: NDArray[np.int64], names: Sequence[str]) -> 
 
 
 def answers(study: Study) -> StudyAnswers:
-    infos, fetch = models.study_results(study), partial(results_of, study)
-    return find_answers(study, infos, answers_query(study, infos), None, fetch)
+    fetch = partial(results_of, study)
+    return find_answers(study, answers_query(study), None, fetch)
 
 
 def points(paths: Sequence[str], rows: Sequence[Sequence[object]]) -> dict[str, Any]:
@@ -102,19 +101,18 @@ def test_a_curve_whose_machine_is_not_named_is_asked_for(spec: dict[str, Any]) -
     """Of many machines some are drawn first; a request that names none gets the question."""
     rows = [[load, f"{20 + k} Hz"] for k in range(12) for load in (0.0, 0.3, 0.6)]
     study = parse_spec({**spec, "axes": [points([LOAD, FREQUENCY], rows)]}).study
-    infos = models.study_results(study)
     with pytest.raises(SelectionError, match=f"of which {FREQUENCY} should the curve be") as caught:
-        select(study, infos, completed(study, infos, LOAD, (), (), ()))
+        select(study, completed(study, LOAD, (), (), ()))
     (fault,) = caught.value.faults
     assert (fault.code, fault.where, fault.unit) == ("not-fixed", "at", "Hz")
-    main = main_query(study, infos)
+    main = main_query(study)
     assert main is not None
     assert (main.x, main.by, len(main.of)) == (LOAD, (FREQUENCY,), 6)
     assert {len(one.line.cases) for one in answers(study).curves} == {3}
     # What a page is not asked for, it holds at a value that it shows.
-    page = curve_query(study, infos, Address(f"x={LOAD}"))
+    page = curve_query(study, Address(f"x={LOAD}"))
     assert page is not None
-    (line,) = select(study, infos, page).lines
+    (line,) = select(study, page).lines
     assert [path for path, _ in page.at] == [FREQUENCY]
     assert {study.case_parameters(case)[FREQUENCY] for case in line.cases.tolist()} == {line.at[FREQUENCY]}
 
@@ -141,17 +139,16 @@ def test_cases_that_lie_on_no_curve_have_none(spec: dict[str, Any]) -> None:
         {"path": path, "from": low, "to": high} for path, low, high in zip(*sample.values(), strict=True)
     ]}]  # fmt: skip
     study = parse_spec({**spec, "axes": axes}).study
-    infos = models.study_results(study)
-    assert main_query(study, infos) is None
-    assert characteristic(study, infos) is None
+    assert main_query(study) is None
+    assert characteristic(study) is None
     assert answers(study).curves == ()
     assert no_curves(study).startswith("No two cases of this study differ in one parameter only")
     with pytest.raises(SelectionError, match="so there is no curve"):
-        completed(study, infos, None, (), (), ())
+        completed(study, None, (), (), ())
     with pytest.raises(SelectionError, match="should the curve be"):
-        select(study, infos, CurveQuery(LOAD, ("shaft.speed.mean",)))
+        select(study, CurveQuery(LOAD, ("shaft.speed.mean",)))
     # Each is a curve of its own where it is named.
-    named = select(study, infos, CurveQuery(LOAD, ("shaft.speed.mean",), (FREQUENCY,)))
+    named = select(study, CurveQuery(LOAD, ("shaft.speed.mean",), (FREQUENCY,)))
     assert sorted(line.cases.size for line in named.lines) == [1] * 16
 
 
@@ -162,13 +159,12 @@ def test_held_columns_have_values_that_occur_together(spec: dict[str, Any]) -> N
     rows = [[load, frequency, mass] for frequency, mass in pairs for load in (0.0, 0.4)]
     paths = [LOAD, FREQUENCY, "pendulums.0.mass"]
     study = parse_spec({**spec, "axes": [points(paths, rows)]}).study
-    infos = models.study_results(study)
     at = held(study, [], (LOAD,))
-    (line,) = select(study, infos, CurveQuery(LOAD, ("shaft.speed.mean",), at=at)).lines
+    (line,) = select(study, CurveQuery(LOAD, ("shaft.speed.mean",), at=at)).lines
     assert (line.cases.size, set(line.at)) == (2, set(paths[1:]))
-    main = main_query(study, infos)
+    main = main_query(study)
     assert main is not None
-    drawn = draw(select(study, infos, replace(main, y=("shaft.speed.mean",))), partial(results_of, study))
+    drawn = draw(select(study, replace(main, y=("shaft.speed.mean",))), partial(results_of, study))
     for curve in drawn.curves:
         machines = {tuple(study.case_parameters(case)[path] for path in paths[1:]) for case in curve.line.cases}
         assert len(machines) == 1
@@ -180,10 +176,9 @@ def test_a_machine_shaft_of_two_columns() -> None:
     paths = ["drive.inertia", "mean_speed"]
     rows = [[inertia, speed] for speed in (10, 12) for inertia in (1, 2, 4)] + [[3, 11]]
     study = parse_spec({**press, "axes": [points(paths, rows)]}).study
-    infos = models.study_results(study)
-    query = main_query(study, infos)
+    query = main_query(study)
     assert query is not None
-    lines = select(study, infos, query).lines
+    lines = select(study, query).lines
     assert sorted(case for line in lines for case in line.cases.tolist()) == list(range(7))
     (other,) = {*paths} - {query.x}
     for line in lines:
@@ -194,5 +189,5 @@ def test_a_value_that_no_case_has_is_refused_with_each_value_once(spec: dict[str
     study = table(spec, "points")
     query = CurveQuery(LOAD, ("shaft.speed.mean",), (), ((FREQUENCY, "23 Hz"),))
     with pytest.raises(SelectionError) as refused:
-        select(study, models.study_results(study), query)
+        select(study, query)
     assert refused.value.faults[0].allowed == "20.0, 22.0, 25.0"

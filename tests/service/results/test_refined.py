@@ -44,10 +44,9 @@ def study() -> Study:
 
 def drawn(study: Study, done: int | None = None, **changes: Any) -> Curves:
     """The curves that are shown first, or changed ones."""
-    infos = models.study_results(study)
-    query = main_query(study, infos)
+    query = main_query(study)
     assert query is not None
-    return draw(select(study, infos, replace(query, **changes)), fetched(study, done))
+    return draw(select(study, replace(query, **changes)), fetched(study, done))
 
 
 def lines_of(figure: Figure, result: str) -> list[Line]:
@@ -65,17 +64,15 @@ def test_the_first_curves_are_those_that_were_asked_for(study: Study) -> None:
 
 
 def test_a_fixed_axis_without_a_role_tells_curves_apart(study: Study) -> None:
-    infos = models.study_results(study)
-    named = select(study, infos, CurveQuery("shaft.load", (SPEED,)))
+    named = select(study, CurveQuery("shaft.load", (SPEED,)))
     assert [line.by for line in named.lines] == [{"excitation.frequency": f} for f in (20.0, 25.0)]
-    held = select(study, infos, CurveQuery("shaft.load", (SPEED,), at=(("excitation.frequency", "20 Hz"),)))
+    held = select(study, CurveQuery("shaft.load", (SPEED,), at=(("excitation.frequency", "20 Hz"),)))
     assert [(line.by, line.at) for line in held.lines] == [({}, {"excitation.frequency": 20.0})]
 
 
 def test_what_is_not_chosen_is_as_in_the_first_curves(study: Study) -> None:
-    infos = models.study_results(study)
-    assert completed(study, infos, None, (), (), ()) == main_query(study, infos)
-    only = completed(study, infos, None, (TORQUE,), (), (("excitation.frequency", "20 Hz"),))
+    assert completed(study, None, (), (), ()) == main_query(study)
+    only = completed(study, None, (TORQUE,), (), (("excitation.frequency", "20 Hz"),))
     assert (only.x, only.y, only.by) == ("shaft.load", (TORQUE,), ())
 
 
@@ -97,7 +94,7 @@ def test_each_curve_tells_its_error_and_its_jumps(study: Study) -> None:
 
 def test_curves_that_were_not_refined_say_nothing_of_errors() -> None:
     listed = replace(study_of(), plan=None)
-    curves = draw(select(listed, models.study_results(listed), CurveQuery("shaft.load", (SPEED,))), fetched(listed))
+    curves = draw(select(listed, CurveQuery("shaft.load", (SPEED,))), fetched(listed))
     assert "error_asked" not in curves.to_json()
     assert not {"error", "jumps", "passed"} & set(curves.to_json()["curves"][0])
 
@@ -246,14 +243,13 @@ def test_curves_without_a_result_are_not_told_to_be_within_the_error(study: Stud
         endings = ["diverged" if one else models.OK for one in bad.tolist()]
         return replace(found, endings=endings, values={n: np.where(bad, np.nan, v) for n, v in found.values.items()})
 
-    infos = models.study_results(study)
-    query = main_query(study, infos)
+    query = main_query(study)
     assert query is not None
-    none = draw(select(study, infos, query), failing)
+    none = draw(select(study, query), failing)
     assert [curve["passed"] for curve in none.to_json()["curves"]] == [True, True]  # nothing is left to refine
     told = curves_figure([("", none)]).below
     assert told == "No case has a result, so that there is no error; 1 % of the range is asked."
-    one = draw(select(study, infos, query), partial(failing, lost=22.5))
+    one = draw(select(study, query), partial(failing, lost=22.5))
     told = curves_figure([("", one)]).below
     assert told.startswith("Within 1 % of the range, as asked")
     assert told.endswith(" 1 curve has no result.")

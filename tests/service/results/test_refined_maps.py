@@ -23,7 +23,6 @@ from sprag_study.service.results.curves import Map
 from sprag_study.service.storage.studies.records import CaseColumns
 from sprag_study.service.views.library import Library
 from sprag_study.service.views.study_questions import ReportQuestion
-from sprag_study.worker import models
 from sprag_study.worker.study import Study
 from tests.service.conftest import API, Service
 from tests.service.figures.seen import seen
@@ -38,8 +37,7 @@ def study() -> Study:
 
 
 def drawn(study: Study, mass: float, done: int | None = None, x: str = LOAD, y: str = FREQUENCY, z: str = SPEED) -> Map:
-    infos = models.study_results(study)
-    return draw_map(study, infos, x, y, z, ((MASS, str(mass)),), fetched(study, done))
+    return draw_map(study, x, y, z, ((MASS, str(mass)),), fetched(study, done))
 
 
 def truth(found: Map, mass: float) -> Any:
@@ -105,7 +103,7 @@ def test_a_map_without_a_result_has_no_error(study: Study) -> None:
     def failing(cases: NDArray[np.int64], names: Sequence[str]) -> CaseColumns:
         return replace(fetched(study)(cases, names), endings=["diverged"] * len(cases))
 
-    found = draw_map(study, models.study_results(study), LOAD, FREQUENCY, SPEED, ((MASS, "0.4"),), failing)
+    found = draw_map(study, LOAD, FREQUENCY, SPEED, ((MASS, "0.4"),), failing)
     assert found.refined is not None
     assert found.refined.sentence == "No case has a result, so that there is no error; 2 % of the range is asked."
 
@@ -121,7 +119,7 @@ def test_a_map_without_a_result_has_no_error(study: Study) -> None:
     ],
 )
 def test_what_cannot_be_drawn_is_refused(study: Study, query: Any, parameter: str, told: str) -> None:
-    draw = partial(draw_map, study, models.study_results(study))
+    draw = partial(draw_map, study)
     with pytest.raises(SelectionError, match=told) as refused:
         draw(*query, fetched(study))
     assert [fault.where for fault in refused.value.faults] == [parameter]
@@ -174,7 +172,7 @@ def test_points_that_had_not_settled_are_missing_values(study: Study) -> None:
         columns = fetch(cases, names)
         return replace(columns, flags=["not_settled" if case % 3 == 0 else "" for case in columns.cases.tolist()])
 
-    found = draw_map(study, models.study_results(study), LOAD, FREQUENCY, SPEED, ((MASS, "0.4"),), flagged)
+    found = draw_map(study, LOAD, FREQUENCY, SPEED, ((MASS, "0.4"),), flagged)
     points = found.to_json()["points"]
     missing = [case for case, value in zip(points["cases"], points["z"], strict=True) if value is None]
     assert missing

@@ -81,7 +81,7 @@ def fetched(cases: np.ndarray[tuple[int], np.dtype[np.int64]], names: list[str])
 
 def drawn() -> Curves:
     one = study(8)
-    return draw(select(one, models.study_results(one), CurveQuery("shaft.load", ("shaft.speed.mean",))), fetched)
+    return draw(select(one, CurveQuery("shaft.load", ("shaft.speed.mean",))), fetched)
 
 
 def test_a_figure_breaks_lines_and_marks_regimes() -> None:
@@ -108,7 +108,7 @@ def test_a_picture_names_the_regimes_that_occur() -> None:
 def test_pictures_of_several_plots_have_room_for_plots_and_marks() -> None:
     one = study(8, 2)
     query = CurveQuery("shaft.load", ("shaft.speed.mean", "torque.mean"), ("excitation.frequency",))
-    curves = draw(select(one, models.study_results(one), query), fetched)
+    curves = draw(select(one, query), fetched)
     both = [("a", curves), ("b", curves)]
     for picture in (draw_curves(curves, "A study", "svg", READING), draw_compare(both, READING, "svg")):
         assert seen(picture).texts.count("unsettled") == 1
@@ -117,9 +117,7 @@ def test_pictures_of_several_plots_have_room_for_plots_and_marks() -> None:
 @pytest.mark.parametrize("name", ["irregular", "unsettled"])
 def test_a_map_marks_what_is_not_periodic(name: str) -> None:
     two = study(8, 2)
-    found = draw_map(
-        two, models.study_results(two), "shaft.load", "excitation.frequency", "shaft.speed.mean", (), fetched
-    )
+    found = draw_map(two, "shaft.load", "excitation.frequency", "shaft.speed.mean", (), fetched)
     marks = {marks.regime: marks.cases.tolist() for marks in doubtful_marks(found)}
     assert marks[name] == [case for case in range(16) if REGIMES[case % 8] == name]
     assert found.to_json()["regime"][1] == REGIMES

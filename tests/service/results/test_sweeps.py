@@ -93,7 +93,7 @@ def test_answers_and_files_have_directions_in_words(service: Service, study_id: 
 
 def test_a_figure_tells_directions_by_dashes_and_loads_by_colours(service: Service, study_id: str) -> None:
     study = service.store.studies.study(study_id)
-    query = main_query(study, models.study_results(study))
+    query = main_query(study)
     assert query is not None
     assert (query.x, query.by) == ("excitation.frequency", ("shaft.load", "sweep"))
 
@@ -145,7 +145,7 @@ def test_the_example_of_the_guide_says_what_the_guide_says() -> None:
     def told_by(spec: dict[str, Any]) -> tuple[Study, Any, str]:
         study = parse_spec(spec).study
         with run_here(spec, study, processes=0) as run:
-            query = main_query(study, models.study_results(study))
+            query = main_query(study)
             assert query is not None
             cases = run.store.rows.cases_of_kind(run.record.id, flag="jumped")
             return study, cases, hysteresis(stored_curves(run.store, run.record.id, query))

@@ -80,14 +80,13 @@ def test_the_yield_of_a_goal_is_that_of_the_command(spec: dict[str, Any]) -> Non
         "tolerances": [{"path": "pendulums.0.mass", "plus_minus": "1 %"}],
     }  # fmt: skip
     study = parse_spec(spec).study
-    infos = models.study_results(study)
 
     def fetch(cases: NDArray[np.int64], names: Sequence[str]) -> CaseColumns:
         known = {SPEED: speed, f"{SPEED}.half_width": width, "regime": np.zeros(1 + drives)}
         columns = {name: known.get(name, np.full(1 + drives, np.nan))[cases] for name in names}
         return CaseColumns(cases, ["ok"] * len(cases), columns, [flags[case] for case in cases.tolist()])
 
-    (line,) = yields(study, infos, [f"{SPEED} >= {least} rad/s"], Asked(None, (), ()), 3, fetch).lines
+    (line,) = yields(study, [f"{SPEED} >= {least} rad/s"], Asked(None, (), ()), 3, fetch).lines
     assert round(float(line.whole.value) * drives) == by_hand
     condition = {"result": SPEED, "at_least": least}
     plan = GoalPlan.from_json(goal_plan(best=[{"yield": [condition], "max": True}], drives=drives))
@@ -137,10 +136,7 @@ def test_planners_are_told_what_counts(service: Service) -> None:
 def test_curves_join_and_compare_what_counts(service: Service) -> None:
     study_id = flagged(service, {"duration": "60 periods"})
     study = service.store.studies.study(study_id)
-    infos = models.study_results(study)
-    drawn = draw(
-        select(study, infos, CurveQuery("shaft.load", (SPEED,))), partial(service.store.rows.for_cases, study_id)
-    )
+    drawn = draw(select(study, CurveQuery("shaft.load", (SPEED,))), partial(service.store.rows.for_cases, study_id))
     (curve,) = drawn.curves
     joined = joined_points(curve, SPEED)
     assert joined is not None
@@ -163,7 +159,6 @@ def test_curves_join_and_compare_what_counts(service: Service) -> None:
 def test_maps_leave_blank_and_mark_what_does_not_count(run: dict[str, str], flag: str) -> None:
     axes = [{"path": "shaft.load", "values": [0.1, 0.2]}, {"path": "excitation.frequency", "values": [20, 25]}]
     study = parse_spec(changed({"/run": run, "/axes": axes})).study
-    infos = models.study_results(study)
     flags = ["", flag, "", "windup_out_of_data"]
 
     def fetch(cases: NDArray[np.int64], names: Sequence[str]) -> CaseColumns:
@@ -172,7 +167,7 @@ def test_maps_leave_blank_and_mark_what_does_not_count(run: dict[str, str], flag
             known["regime"] = np.array([Regime.UNSETTLED if flags[case] == flag else Regime.PERIODIC for case in cases])
         return CaseColumns(cases, ["ok"] * len(cases), known, [flags[case] for case in cases.tolist()])
 
-    drawn = draw_map(study, infos, "shaft.load", "excitation.frequency", SPEED, (), fetch)
+    drawn = draw_map(study, "shaft.load", "excitation.frequency", SPEED, (), fetch)
     assert drawn.known()[drawn.cases == 1].size == 1
     np.testing.assert_array_equal(np.isnan(drawn.known()), drawn.cases == 1)
     assert not np.isnan(drawn.values).any()
@@ -195,9 +190,8 @@ def test_sensitivities_and_explore_leave_out_what_does_not_count(service: Servic
 def test_a_refined_curve_is_resolved_without_unsettled_points() -> None:
     """Unsettled points beside a gap do not count as points of the curve."""
     study = refined_study.study_of()
-    infos = models.study_results(study)
     query = CurveQuery("shaft.load", (refined_study.SPEED,), at=())
-    selection = select(study, infos, query)
+    selection = select(study, query)
     marked = selection.lines[0].cases[3]
 
     def fetch(cases: NDArray[np.int64], names: Sequence[str]) -> CaseColumns:
@@ -233,12 +227,12 @@ def test_what_a_shaft_needs_in_order_to_turn_counts_where_it_does_not() -> None:
 
     assert list(batch.endings) == ["inertia_insufficient", "ok"]
     query = CurveQuery("drive.inertia", ("required_inertia", "least_mean_speed", "irregularity"), (), ())
-    (curve,) = draw(select(study, infos, query), fetch).curves
+    (curve,) = draw(select(study, query), fetch).curves
     # Energy to be stored: 1 N*m over half a turn, pi J; pi/(delta omega^2) = pi/(0.5*4).
     assert curve.known("required_inertia") == pytest.approx([np.pi / 2.0, np.pi / 2.0], rel=1e-9)
     assert np.isfinite(curve.shown("least_mean_speed")).all()
     assert np.isnan(curve.known("irregularity")).tolist() == [True, False]
-    answers = find_answers(study, infos, answers_query(study, infos), "0.1 kg*m^2", fetch).curves[0].answers
+    answers = find_answers(study, answers_query(study), "0.1 kg*m^2", fetch).curves[0].answers
     (needed,) = (one for one in answers if one.answer.result == "required_inertia")
     assert needed.value == pytest.approx(np.pi / 2.0, rel=1e-9)
     block = RowBlock(infos, np.arange(2), list(batch.endings), ["", ""], batch.values)

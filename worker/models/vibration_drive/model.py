@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 import numpy as np
@@ -85,6 +86,13 @@ _SETTLED_VARIANT, _STARTS_VARIANT = "-settled", "-starts"
 _INFOS: Final[dict[str, Callable[[int], tuple[ResultInfo, ...]]]] = {
     "": result_infos, _SETTLED_VARIANT: settled_infos, _STARTS_VARIANT: started_infos,
 }  # fmt: skip
+
+
+@cache
+def _results(variant: str) -> tuple[ResultInfo, ...]:
+    number, dash, kind = variant.partition("-")
+    return _INFOS[f"{dash}{kind}"](int(number))
+
 
 #: A drive whose known answers show all phases of its motion.
 _DRIVEN: Final = {
@@ -218,8 +226,7 @@ class VibrationDrive(Model):
         return f"{pendulums(study)}{kind}"
 
     def results(self, variant: str) -> tuple[ResultInfo, ...]:
-        number, dash, kind = variant.partition("-")
-        return _INFOS[f"{dash}{kind}"](int(number))
+        return _results(variant)
 
     def numbered_by(self, variant: str) -> str | None:
         return NUMBER if variant.endswith(_STARTS_VARIANT) else None

@@ -87,7 +87,7 @@ class Comparison:
     def held(self) -> list[tuple[str, ...]]:
         """What is held of each study. Raises SelectionError for choices that it does not have."""
         pairs = enumerate(self.studies)
-        return [select(study, models.study_results(study), self.query(place)).held for place, study in pairs]
+        return [select(study, self.query(place)).held for place, study in pairs]
 
 
 def chosen_studies(store: Store, given: QueryParams) -> list[StudyRecord]:
@@ -114,7 +114,7 @@ def comparison(store: Store, given: QueryParams, records: list[StudyRecord]) -> 
     results = [info for info in infos if all(info.name in names for names in known)]
     if not axes or not results:
         raise refused("study", "nothing-in-common", _nothing_in_common(studies, some_axis=bool(axes)))
-    main = main_query(studies[0], infos)
+    main = main_query(studies[0])
     x = given.get("x") or (main.x if main and main.x in axes else axes[0])
     by = tuple(path for path in given.getlist("by") if path and path != x)
     at = tuple(item for item in given.getlist("at") if item.partition("=")[2].strip())
@@ -176,7 +176,7 @@ def drawn(store: Store, chosen: Comparison, names: Sequence[str]) -> list[tuple[
     found = []
     for position, (record, study) in enumerate(zip(chosen.records, chosen.studies, strict=True)):
         try:
-            selection = select(study, models.study_results(study), chosen.query(position))
+            selection = select(study, chosen.query(position))
         except SelectionError as error:
             faults = [replace(item, message=f"{names[position]}: {item.message}") for item in error.faults]
             raise SelectionError(faults) from error

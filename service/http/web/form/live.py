@@ -113,7 +113,7 @@ async def live_answer(work: Work, values: Values, width: int = _WIDTH) -> dict[s
 
 def _text(study: Study, reading: Reading, case: dict[str, Any]) -> str:
     shown = models.presentation_of(study)
-    own, infos = shown.laboratory, {info.name: info for info in models.study_results(study)}
+    own, infos = shown.laboratory, models.results_by_name(study)
     main = own.main or dict.fromkeys(name for name in shown.drawn if name in infos)
     rows = [
         (infos[name], main.get(name) or "", case["results"].get(name))

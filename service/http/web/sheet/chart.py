@@ -34,6 +34,7 @@ from sprag_study.service.results.key_answer_words import curve_name
 from sprag_study.service.results.key_answers import answers_query, find_answers
 from sprag_study.service.results.refined import curve_plan
 from sprag_study.service.results.refined_maps import map_plan
+from sprag_study.service.results.selection import numeric_names
 from sprag_study.service.results.stored_curves import drawn_curves, stored_map
 from sprag_study.service.results.tolerances.ribbons import QUANTILES
 from sprag_study.service.views.calibration import CalibrationView
@@ -45,7 +46,7 @@ from sprag_study.service.views.study_view import found
 from sprag_study.worker import models
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from sprag_study.service.figures.figure import Figure
     from sprag_study.service.reading.reader import Reading
@@ -110,7 +111,7 @@ class Chart:
 def has_chart(study: Study) -> bool:
     """Whether a study is drawn on its sheet once it has rows."""
     chosen = study.plan is not None or study.spread is not None
-    return chosen or answers_query(study, models.study_results(study)) is not None
+    return chosen or answers_query(study) is not None
 
 
 def chart_of(
@@ -127,16 +128,15 @@ def chart_of(
         return draw(FrontView(), FrontQuestion(), Phrase("Every design of the search"))
     if kind == "measured":
         return draw(CalibrationView(), None, Phrase("Measured points on the fitted curve"))
-    infos = models.study_results(study)
     if params.get("z") or (map_plan(study) is not None and not params.get("x")):
-        return _map(library, study_id, study, infos, params, reading, cases)
+        return _map(library, study_id, study, params, reading, cases)
     if study.spread is not None and not any(params.get(name) for name in CHOICES):
-        names, places = (judged_by(study, [info.name for info in infos]),), asked_like(usual)
+        names, places = (judged_by(study, models.results_by_name(study)),), asked_like(usual)
         own = pairs_of(CurveQuery(places.x or "", names, places.by, places.at))
         query = RibbonQuery(names, places, QUANTILES, False)
         title = Phrase("9 of 10 drives lie in the band")
         return draw(RibbonView(), query, title, urlencode([pair for pair in own if pair[1]]))
-    return _curves(library, study_id, study, infos, params, usual, reading, cases)
+    return _curves(library, study_id, study, params, usual, reading, cases)
 
 
 def _drawn(
@@ -165,12 +165,11 @@ def _map(
     library: Library,
     study_id: str,
     study: Study,
-    infos: tuple[ResultInfo, ...],
     params: QueryParams,
     reading: Reading,
     cases: str,
 ) -> Chart | None:
-    query = map_query(study, infos, as_map(params))
+    query = map_query(study, as_map(params))
     if query is None:
         return None
     mapped = stored_map(library.store, study_id, CurveQuery(query.x, (query.z,), (query.y,), query.at))
@@ -184,7 +183,7 @@ def _map(
 
 
 def results_of(
-    study: Study, infos: tuple[ResultInfo, ...], params: QueryParams, drawn: Curves | None = None
+    study: Study, infos: Iterable[ResultInfo], params: QueryParams, drawn: Curves | None = None
 ) -> tuple[tuple[str, ...], list[str]]:
     """The results that are drawn, and those that the lower chart can show: none where others are asked for.
 
@@ -194,12 +193,12 @@ def results_of(
     if asked:
         return asked, []
     plan = curve_plan(study)
-    known = plan.results if plan is not None else tuple(info.name for info in infos if info.kind != "category")
+    known = plan.results if plan is not None else tuple(numeric_names(infos))
     first = judged_by(study, known)
     curves = () if drawn is None else drawn.curves
     empty = {name for curve in curves for name in curve.y if not _numbered(curves, name)}
     known = tuple(name for name in known if first in empty or name not in empty)
-    others = (*models.presentation_of(study).below, *main_results(study, infos))
+    others = (*models.presentation_of(study).below, *main_results(study))
     below = list(dict.fromkeys(name for name in others if name in known and name != first))[:4]
     lower = params.get("lower")
     second = lower if lower in below else next(iter(below), None)
@@ -214,7 +213,6 @@ def _curves(
     library: Library,
     study_id: str,
     study: Study,
-    infos: tuple[ResultInfo, ...],
     params: QueryParams,
     usual: CurveQuery | None,
     reading: Reading,
@@ -223,7 +221,7 @@ def _curves(
     answers = answers_of_address(library, study_id, params, usual, reading)
     if answers.query is None or answers.drawn is None:
         return None
-    names, below = results_of(study, infos, params, answers.drawn)
+    names, below = results_of(study, models.study_results(study), params, answers.drawn)
     query = replace(answers.query, y=names)
     curves = drawn_curves(library.store, study_id, query)
     figure = curves_figure([("", curves)], 1)
@@ -231,12 +229,12 @@ def _curves(
         figure = replace(figure, spans={}, looks={})
     titles = tuple(curve_name(one, study) for one in answers.curves)
     chosen = curve_place(study, answers, params.get("curve") or "")
-    curve, by_name = answers.drawn.curves[chosen], {info.name: info for info in infos}
+    curve = answers.drawn.curves[chosen]
     asked = bool((params.get("point") or "").strip())
     spot = place_on(curve, judged_by(study, curve.y), answers.point, asked=asked)
     slider = None
     if spot is not None and not figure.note:
-        own = Along(study, by_name, curve, answers.query.x, *spot)
+        own = Along(study, curve, answers.query.x, *spot)
         figure = _with_point(figure, own, names, chosen)
         slider = _slider(own, reading)
     read = read_figure(figure, reading)
@@ -270,20 +268,18 @@ def answers_of_address(
 ) -> StudyAnswers:
     """The answers of the curves and the point that an address asks for. Raises SelectionError."""
     study = library.store.studies.study(study_id)
-    infos = models.study_results(study)
-    query = answers_query(study, infos, chosen_curves(study, params, usual))
+    query = answers_query(study, chosen_curves(study, params, usual))
     point = point_of(study, query, params, reading)
-    return find_answers(study, infos, query, point, partial(library.store.rows.for_cases, study_id))
+    return find_answers(study, query, point, partial(library.store.rows.for_cases, study_id))
 
 
 def chosen_curves(study: Study, params: QueryParams, usual: CurveQuery | None) -> CurveQuery | None:
     """The curves that an address asks for, otherwise the ``usual`` ones. Raises SelectionError."""
-    infos = models.study_results(study)
-    if answers_query(study, infos) is None:
+    if answers_query(study) is None:
         return None
     if not any(params.getlist(name) for name in CHOICES if name != "y"):
         return usual
-    return curve_query(study, infos, params)
+    return curve_query(study, params)
 
 
 def point_of(study: Study, query: CurveQuery | None, params: QueryParams, reading: Reading) -> str | None:
@@ -300,7 +296,7 @@ def _with_point(figure: Figure, own: Along, names: tuple[str, ...], chosen: int)
         value = own.value(own.places[0], name) if name in own.curve.y else np.nan
         if len(own.places) == 1 and np.isfinite(value):
             colour = next((line.colour for line in panel.lines if line.key == str(chosen)), "")
-            text = joined("", [amount(own.infos[name], value)])
+            text = joined("", [amount(models.results_by_name(own.study)[name], value)])
             notes = (Note(own.x, value, colour, "point", text, str(chosen)),)
         panels.append(replace(panel, notes=notes))
     return replace(figure, panels=tuple(panels), at=own.x)

@@ -40,7 +40,7 @@ def drawer_of(
     numeric = [info for info in infos if info.kind != "category"]
     kind = given.get("kind") or "heatmap"
     kind = kind if kind in KINDS else "heatmap"
-    mapped = map_query(study, infos, QueryParams()) is not None
+    mapped = map_query(study, QueryParams()) is not None
     found: dict[str, Any] = {
         "asked": bool(sheet.faults) or any(given.get(name) for name in (*CHOICES, "z", "up")),
         "axes": axis_choices(study),
@@ -100,7 +100,7 @@ def _regime_maps(study: Study, study_id: str) -> list[tuple[str, str]]:
 
 def _map_address(study: Study, study_id: str, z: str) -> str | None:
     """Address of the map of a result; None where no two parameters span one."""
-    query = map_query(study, models.study_results(study), QueryParams({"z": z}))
+    query = map_query(study, QueryParams({"z": z}))
     if query is None or map_plan(study) is not None:
         return None
     return with_query(f"/studies/{study_id}", map_pairs(pairs_of(query)))

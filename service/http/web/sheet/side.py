@@ -135,11 +135,7 @@ def _questions(
 
 def _along(library: Library, study_id: str, study: Study, related: Sequence[Relative], reading: Reading) -> Question:
     """The question of how it runs along an axis."""
-    query = (
-        None
-        if study.plan is not None and asked_by(study) != "along"
-        else main_query(study, models.study_results(study))
-    )
+    query = None if study.plan is not None and asked_by(study) != "along" else main_query(study)
     if query is None:
         along = models.presentation_of(study).along
         path = along[0] if along else ""
@@ -162,7 +158,7 @@ def _answers_along(relative: Relative, study: Study, path: str) -> bool:
     other = relative.study
     if relative.asked != "along" or relative.differs:
         return False
-    query = main_query(other, models.study_results(other))
+    query = main_query(other)
     if query is None or map_plan(other) is not None or other.axis_of(query.x) != other.axis_of(path):
         return False
     # It tells about the curve nearest to its base.

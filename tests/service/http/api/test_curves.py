@@ -243,7 +243,7 @@ def test_many_numbers_are_written_by_a_process_that_checks(
 def test_what_a_process_refuses_comes_back_whole(service: Service, grid: dict[str, Any]) -> None:
     study = service.store.studies.study(service.submit(grid))
     with pytest.raises(SelectionError) as refused:
-        select(study, models.study_results(study), CurveQuery("nonsense", ("torque.max",)))
+        select(study, CurveQuery("nonsense", ("torque.max",)))
     again = pickle.loads(pickle.dumps(refused.value))
     assert (again.faults, str(again)) == (refused.value.faults, str(refused.value))
 

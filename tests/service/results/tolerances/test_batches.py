@@ -17,7 +17,6 @@ from sprag_study.service.results.tolerances.batch import Asked
 from sprag_study.service.results.tolerances.conditions import first_condition
 from sprag_study.service.results.tolerances.yields import yields
 from sprag_study.service.spec.document import load_spec, parse_spec
-from sprag_study.worker import models
 from tests.service.conftest import API
 from tests.service.results.tolerances.conftest import DEVIATION, MEAN, SPEC, finish
 from tests.service.shapes import fits
@@ -236,7 +235,7 @@ def test_the_page_shows_ribbon_yield_and_the_worst_drives(service: Service) -> N
 def test_of_the_half_nearest_to_nominal_as_many_are_good_as_the_closed_form_says(service: Service) -> None:
     study_id = finish(service, {**SPEC, "axes": []})
     own = service.store.studies.study(study_id)
-    found = yields(own, models.study_results(own), ["speed >= 58 m"], Asked(), 0, partial(
+    found = yields(own, ["speed >= 58 m"], Asked(), 0, partial(
         service.store.rows.for_cases, study_id))  # fmt: skip
     (line,) = found.lines
     # A draw of the half has a standard score of at most 0.6745; the base is 59 m.
@@ -253,7 +252,7 @@ def test_of_the_half_nearest_to_nominal_as_many_are_good_as_the_closed_form_says
 def test_drives_of_which_nine_of_ten_are_good_are_as_near_to_nominal_as_the_closed_form_says(service: Service) -> None:
     study_id = finish(service, {**SPEC, "axes": [], "drives": 4096})
     own = service.store.studies.study(study_id)
-    found = yields(own, models.study_results(own), ["speed >= 55 m"], Asked(), 0, partial(
+    found = yields(own, ["speed >= 55 m"], Asked(), 0, partial(
         service.store.rows.for_cases, study_id))  # fmt: skip
     (line,) = found.lines
     # A first parameter within so many standard deviations of 1 m; the base is 59 m.
