@@ -6,6 +6,7 @@ language, units and words. Its first argument is the text of the catalogue.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -138,7 +139,9 @@ def _printed(amount: Amount, reading: Reading | None = None) -> str:
     """An amount as in print, in the units of a reader; without one, in its own unit."""
     value, unit = amount.value, amount.unit
     if reading is not None:
-        value, unit = reading.value(value, unit), reading.unit(unit)
+        if not amount.bare:
+            return reading.quantity(value, unit, amount.digits)
+        value = reading.value(value, unit)
     text = number(value, amount.digits)
     return text if amount.bare else f"{text} {unit_text(unit)}".strip()
 
@@ -146,6 +149,14 @@ def _printed(amount: Amount, reading: Reading | None = None) -> str:
 def joined(separator: str, parts: Iterable[Part]) -> Phrase:
     """The parts with a separator between them, which is no word."""
     return Phrase.listed(separator, parts)
+
+
+_RADIANS: Final = "rad"
+
+
+def _short(value: Any, digits: int) -> bool:
+    """Whether a number is printed whole."""
+    return isinstance(value, float) and math.isclose(float(f"{value:.{digits}g}"), value, rel_tol=1e-14)
 
 
 #: What quantities are called: for people, or as in specs and files.
@@ -227,8 +238,15 @@ class Reading:
         return self.units.cell(value, si)
 
     def quantity(self, value: Any, si: str, digits: int = 5) -> str:
-        """A number in SI as people read it, with its unit."""
-        return f"{number(self.value(value, si), digits)} {unit_text(self.unit(si))}".strip()
+        """A number in SI as people read it, with its unit.
+
+        An angle that was given in radians stays in them where it has no short number of degrees, so that it can be
+        typed back.
+        """
+        shown, unit = self.value(value, si), self.unit(si)
+        if si == _RADIANS and unit != si and _short(value, digits) and not _short(shown, digits):
+            shown, unit = value, si
+        return f"{number(shown, digits)} {unit_text(unit)}".strip()
 
     def typed(self, text: str, si: str) -> str:
         """What somebody typed beside a label with the shown unit: a bare number gets this unit."""

@@ -10,7 +10,8 @@ from sprag_study.service.reading.catalogue import axes_json
 from sprag_study.service.reading.reader import Phrase, joined, plural
 from sprag_study.service.report.blocks import Section, Table, Text
 from sprag_study.service.results.asked import goals_of, limits_of
-from sprag_study.service.results.varied import ends, formula_text, varied, with_distribution, with_tolerance
+from sprag_study.service.results.selection import with_tolerance
+from sprag_study.service.results.varied import ends, formula_text, varied, with_distribution
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

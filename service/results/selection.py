@@ -17,6 +17,7 @@ from sprag_study.service.reading.reader import Phrase, term
 from sprag_study.service.reading.texts import did_you_mean
 from sprag_study.service.reading.together import AMBIGUOUS_UNIT, question, with_unit_of_end
 from sprag_study.service.reading.units import QuantityError, typed_value
+from sprag_study.service.reading.wording import typed_text
 from sprag_study.worker import models
 from sprag_study.worker.directions import DIRECTIONS, SWEEP, direction
 from sprag_study.worker.spread import DRIVE
@@ -109,15 +110,28 @@ def axis_name(study: Study, path: str) -> str:
     return " = ".join(dict.fromkeys((path, *tied)))
 
 
-def held_text(study: Study, path: str, value: float) -> Phrase:
-    """A parameter held at ``value`` (SI) for display: ``excitation.frequency = 25 Hz``."""
+def held_text(study: Study, path: str, value: float, *, every: bool = False) -> Phrase:
+    """A parameter held at ``value`` (SI) for display: ``excitation.frequency = 25 Hz``.
+
+    That of ``every`` drive of a batch has its tolerance.
+    """
     if path == SWEEP:
         return Phrase("{name} {direction}", name=Name(SWEEP, within=True), direction=term(direction(value)))
-    return Phrase("{name} = {value}", name=Name(axis_name(study, path)), value=Amount(value, unit_of(study, path), 6))
+    amount = Amount(value, unit_of(study, path), 6)
+    said = with_tolerance(study, path, amount) if every else amount
+    return Phrase("{name} = {value}", name=Name(axis_name(study, path)), value=said)
+
+
+def with_tolerance(study: Study, path: str, value: str | Amount) -> str | Amount:
+    """A value with the tolerance of its parameter as it was written: ``0.2 mm ± 60 %``; the value without one."""
+    for one in () if study.spread is None else study.spread.tolerances:
+        if path in one.paths and "plus_minus" in one.about:
+            return Phrase("{value} ± {tolerance}", value=value, tolerance=typed_text(str(one.about["plus_minus"])))
+    return value
 
 
 def held_texts(study: Study, at: Mapping[str, float]) -> tuple[Phrase, ...]:
-    """The fixed axes, then the constant parameters of the operating point."""
+    """The fixed axes, then the constant parameters of the operating point; those of every drive with tolerances."""
     point, varying = models.presentation_of(study).operating_point, study.axis_paths
     always = [path for path in point if path in study.base and path not in varying]
     values = study.base
@@ -130,7 +144,7 @@ def held_texts(study: Study, at: Mapping[str, float]) -> tuple[Phrase, ...]:
         }
         values = {**values, **drawn}
     fixed = [*at.items(), *((path, values[path]) for path in always)]
-    return tuple(held_text(study, path, value) for path, value in fixed)
+    return tuple(held_text(study, path, value, every=DRIVE not in at) for path, value in fixed)
 
 
 def locate_axes(study: Study, at: Sequence[tuple[str, str]], parameter: str = "at") -> Fixed:

@@ -14,6 +14,7 @@ from sprag_study.service.reading.reader import CODES, Phrase, joined, plural, te
 from sprag_study.service.reading.wording import number, typed_text, unit_text
 from sprag_study.service.results.calibration import plan_of
 from sprag_study.service.results.fronts import goal_of
+from sprag_study.service.results.selection import with_tolerance
 from sprag_study.worker.models import NO_PARAMETERS
 from sprag_study.worker.planning.calibrate.plan import CALIBRATE
 from sprag_study.worker.planning.goals.plan import GOAL
@@ -106,14 +107,6 @@ def ends(low: float, high: float, unit: str, digits: int = _DIGITS) -> Text:
     if low == high:
         return Amount(low, unit, digits)
     return Phrase("{low} to {high}", low=Amount(low, unit, digits, bare=True), high=Amount(high, unit, digits))
-
-
-def with_tolerance(study: Study, path: str, value: Text) -> Text:
-    """A value with the tolerance of its parameter as it was written: ``0.2 mm ± 60 %``; the value without one."""
-    for one in () if study.spread is None else study.spread.tolerances:
-        if path in one.paths and "plus_minus" in one.about:
-            return Phrase("{value} ± {tolerance}", value=value, tolerance=typed_text(str(one.about["plus_minus"])))
-    return value
 
 
 def with_distribution(study: Study, path: str, value: Text) -> Text:

@@ -105,7 +105,7 @@ class Described:
             return {"enum": list(self.values), **schema}
         if self.kind == "flag":
             return {"type": "boolean", **schema}
-        kind = "integer" if self.kind == "whole" else "number"
+        kind = "integer" if self.kind == "whole" else ["number", "string"]
         return {"type": kind, "minimum": self.low, "maximum": self.high, **schema}
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from sprag_study.sentences import Amount, Sentence, plural
 from sprag_study.service.reading.catalogue import range_sentence
 from sprag_study.service.reading.limits import one_of, quoted, span
+from sprag_study.service.reading.numbers import parse_number
 from sprag_study.service.reading.texts import did_you_mean
 from sprag_study.service.reading.units import (
     PERIOD_NAMES,
@@ -146,12 +147,15 @@ class Node:
     def plain(self, low: float, high: float) -> float | None:
         """A number without a unit from ``low`` to ``high``."""
         allowed = Sentence("{low} to {high}, a plain number", low=Amount(low, digits=6), high=Amount(high, digits=6))
-        if isinstance(self.value, bool) or not isinstance(self.value, int | float):
+        value = self.value
+        if isinstance(value, str) and not value.isascii():  # as pages print it: 1·10⁻⁹
+            value = parse_number(value)
+        if isinstance(value, bool) or not isinstance(value, int | float):
             self.refuse("wrong-type", "must be a plain number", allowed=allowed)
-        elif not low <= self.value <= high:
+        elif not low <= value <= high:
             self.refuse("out-of-range", "is out of range", allowed=allowed)
         else:
-            return float(self.value)
+            return float(value)
         return None
 
     def periods(self, low: int, high: int) -> int | None:

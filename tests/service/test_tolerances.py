@@ -97,6 +97,7 @@ def test_a_caption_has_the_values_of_the_drive() -> None:
     frequency = study.columns([2])["excitation.frequency"][0]
     assert "excitation.frequency = 25 Hz" in held_texts(study, {DRIVE: 0.0})
     assert f"excitation.frequency = {frequency:.6g} Hz" in held_texts(study, {DRIVE: 2.0})
+    assert any(text.startswith("excitation.frequency = 25 Hz ± ") for text in held_texts(study, {}))  # every drive
 
 
 def test_pages_show_the_drive_of_a_case_and_its_values(filled: tuple[Service, str]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -39,6 +39,8 @@ _ROWS = Listed(
     item={"type": "array", "minItems": 2, "maxItems": 2, "items": QUANTITY, "description": "angle and torque"},
 )  # fmt: skip
 _LAW = Record({"coefficients": _COEFFICIENTS, "windup_limit": CLUTCH_WINDUP_LIMIT}, required=("coefficients",))
+#: How pages print that the law has no limit, in each language.
+_NO_LIMIT: Final = ("none", "немає")
 MEASURED = Record({"data": _ROWS, "accuracy": _ACCURACY, **FIT}, required=("data", "accuracy"))
 CLUTCH = Variants((_LAW, MEASURED), "torque of the freewheel clutch over its windup", only=True)
 
@@ -107,7 +109,7 @@ def read_clutch(node: Node, prefix: str, backlashes: Sequence[float]) -> Clutch 
 
 def _given(node: Node, prefix: str) -> Clutch | None:
     limit: float | None = math.inf
-    if "windup_limit" in node:
+    if "windup_limit" in node and node["windup_limit"].value not in _NO_LIMIT:
         limit = node["windup_limit"].number(CLUTCH_WINDUP_LIMIT)
     items = _COEFFICIENTS.read(node["coefficients"])
     if items is None:

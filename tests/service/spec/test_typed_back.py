@@ -15,24 +15,27 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from sprag_study.sentences import Amount, joined
 from sprag_study.service import languages, views
 from sprag_study.service.cli.extend import _values
+from sprag_study.service.http.views import preset_of
 from sprag_study.service.http.web.form.entries import list_of, plain
 from sprag_study.service.http.web.form.fields import Field, refine_fields, run_fields, search_fields
 from sprag_study.service.http.web.form.machine import entries
 from sprag_study.service.http.web.form.page import empty
-from sprag_study.service.http.web.form.spec import spec_of
+from sprag_study.service.http.web.form.sent import settle
+from sprag_study.service.http.web.form.spec import spec_of, values_of
 from sprag_study.service.languages import language
 from sprag_study.service.presets import preset_names, preset_text
 from sprag_study.service.reading import units
 from sprag_study.service.reading.numbers import in_language, parse_number
-from sprag_study.service.reading.quantities import KINDS
+from sprag_study.service.reading.quantities import KINDS, Units
 from sprag_study.service.reading.reader import Reading
 from sprag_study.service.reading.units import QuantityError, measure, parse_quantity, split_quantity
 from sprag_study.service.reading.wording import number, typed_text, unit_text
 from sprag_study.service.spec.components import KINDS as COMPONENT_KINDS
 from sprag_study.service.spec.components import faults_of, fields_of
-from sprag_study.service.spec.document import format_of, load_spec
+from sprag_study.service.spec.document import format_of, load_spec, parse_spec
 from sprag_study.worker import models
 from tests.service.spec_sample import changed
 
@@ -253,7 +256,37 @@ def test_what_one_door_reads_all_read() -> None:
         # In a list an ordinary blank could also separate values; pages print a narrow one.
         assert parse_quantity(_values(text.replace("1 500", "1\u202f500"))[0], "rad/s") == pytest.approx(expected)
     spec = changed({"/base/excitation/frequency": "1 500 об/хв", "/base/shaft/inertia": "2·10⁻³ кг·м2"})
-    from sprag_study.service.spec.document import parse_spec
-
     study = parse_spec(spec).study
     assert study.base["shaft.inertia"] == pytest.approx(2e-3)
+
+
+def test_an_angle_in_radians_is_printed_so_that_it_is_the_same_again() -> None:
+    """Its degrees have no short number; other quantities keep the unit of the reader."""
+    shown = Reading(models.VIBRATION_DRIVE, Units({"rad": "deg", "m": "in"}))
+    texts = {0.005: "0.005 rad", math.radians(0.3): "0.3 deg", 1.0 / 3.0: "19.099 deg", 0.0: "0 deg"}
+    assert {value: shown.quantity(value, "rad") for value in texts} == texts
+    assert shown.say(joined("", [Amount(0.005, "rad")])) == "0.005 rad"
+    assert shown.quantity(0.002, "m") == "0.07874 in"
+
+
+@pytest.mark.parametrize("text", ["1·10⁻⁹", "1,0·10⁻⁹"])
+def test_a_tolerance_of_the_run_is_typed_as_it_is_printed(text: str) -> None:
+    assert parse_spec(changed({"/run/tolerance": text})).study.run["tolerance"] == 1e-9
+
+
+@pytest.mark.parametrize("code", LANGUAGES)
+def test_no_limit_of_the_windup_is_typed_as_it_is_printed(code: str) -> None:
+    with language(code):
+        spec = changed({"/base/clutch": {"coefficients": [0, 200], "windup_limit": languages.gettext("none")}})
+        assert "clutch.windup_limit" not in parse_spec(spec).study.base
+
+
+@pytest.mark.parametrize("text", ["9 N/mm ± 10 %", "9 ± 10 %", "9 ± 0.9 N/mm"])
+def test_a_value_is_typed_with_its_tolerance(text: str) -> None:
+    values = values_of(preset_of("one_pendulum")["spec"])
+    values |= {"/base/pendulums/0/spring_rate": text, "unit:/base/pendulums/0/spring_rate": "N/mm"}
+    settle(values)
+    study = parse_spec(spec_of(values)[0]).study
+    assert study.base["pendulums.0.spring_rate"] == 9000.0
+    assert study.spread is not None
+    assert [one.about["plus_minus"] for one in study.spread.tolerances] == [text.partition("± ")[2]]

@@ -13,7 +13,9 @@ from sprag_study.service.http.web.form.entries import Values, names_of
 from sprag_study.service.http.web.form.machine import BASE, entries, form_of, model_name, row_of
 from sprag_study.service.http.web.form.parts import PARTS, count_of, drop, reshape, with_tolerances
 from sprag_study.service.http.web.form.spec import is_search
+from sprag_study.service.http.web.form.tolerances import BATCH, own_name
 from sprag_study.service.reading.quantities import is_si
+from sprag_study.service.reading.together import with_last_unit
 from sprag_study.service.reading.units import QuantityError, split_quantity
 from sprag_study.worker import models
 from sprag_study.worker.models.form import FormChoice, Rows
@@ -43,6 +45,7 @@ def settle(values: Values, *, with_ticks: bool = True) -> None:
         del values[name]
     if with_ticks and kinds:
         _empty(values, kinds)
+    _part_tolerances(values)
     for name in [name for name in values if name.startswith(UNIT)]:
         unit, field = values.pop(name), name.removeprefix(UNIT)
         for own in (field, *(f"{field}/{part}" for part in IN_ROW)):
@@ -62,6 +65,15 @@ def settle(values: Values, *, with_ticks: bool = True) -> None:
         for path in paths:
             if path not in changed:
                 _vary(values, part, path, wanted=path in varying)
+
+
+def _part_tolerances(values: Values) -> None:
+    """Read a number with its tolerance, such as ``9 N/mm ± 10 %``, into the fields of both."""
+    typed = [name for name, text in values.items() if "±" in text and name.startswith(f"{BASE}/")]
+    for name in typed and [entry.name for entry in entries(values) if entry.tolerant and entry.name in typed]:
+        parts, field = with_last_unit(values[name].split("±", 1)), f"{own_name(name)}/plus_minus"
+        if all(part.strip() for part in parts) and not values.get(field, "").strip():
+            values |= {name: parts[0].strip(), field: parts[1].strip(), BATCH: "on"}
 
 
 def changed_kinds(values: Mapping[str, str]) -> Values:

@@ -19,7 +19,7 @@ from sprag_study.service.reading.catalogue import unit_of
 from sprag_study.service.reading.reader import joined
 from sprag_study.service.reading.wording import number, unit_text
 from sprag_study.service.results.headlines.headline import DIMENSION_DIGITS
-from sprag_study.service.results.varied import with_tolerance
+from sprag_study.service.results.selection import with_tolerance
 from sprag_study.worker import models
 from sprag_study.worker.models.formulas import evaluate
 
