@@ -20,7 +20,7 @@ from sprag_study.service.formats import FORMATS, HEADERS
 from sprag_study.service.http.problems import PROBLEM_TYPES, problem_json
 from sprag_study.service.http.views import case_detail, whole_detail
 from sprag_study.service.jobs import checks
-from sprag_study.service.jobs.submission import take_in
+from sprag_study.service.jobs.submission import accept
 from sprag_study.service.json_text import to_bytes
 from sprag_study.service.reading.limits import span
 from sprag_study.service.reading.numbers import whole_number
@@ -29,6 +29,7 @@ from sprag_study.service.reading.reader import CAPTIONS, Choice
 from sprag_study.service.report import REPORT_FORMATS, Office, report_file
 from sprag_study.service.results.rounds import round_json
 from sprag_study.service.results.start_states import check_start
+from sprag_study.service.spec.text import Body
 from sprag_study.service.storage.errors import StoreError
 from sprag_study.service.views import row_files
 from sprag_study.service.views.case_pages import case_page, page_json, wanted
@@ -54,8 +55,8 @@ from sprag_study.worker.states import TransitionError
 if TYPE_CHECKING:
     from sprag_study.service.client.wire import Query
     from sprag_study.service.faults import Kind
-    from sprag_study.service.jobs.submission import Submission
     from sprag_study.service.settings import Settings
+    from sprag_study.service.spec.document import ParsedSpec
     from sprag_study.service.storage.store import Store
     from sprag_study.service.storage.studies.records import StudyRecord
     from sprag_study.worker.study import Study
@@ -97,8 +98,9 @@ class Here(Connection, ABC):
         with _refusing():
             if method != "GET":
                 body = plain_body(arguments.get("json"))
-                made = self._further(study_id, part, list(arguments.get("params", ())), body)
-                record = take_in(self.library.store, made)
+                record = accept(
+                    self.library.store, self._further(study_id, part, list(arguments.get("params", ())), body)
+                )
                 self.run(record)
                 return {"id": record.id}
             answer: dict[str, Any] = json.loads(b"".join(self._content(study_id, part, arguments.get("params", ()))))
@@ -120,22 +122,22 @@ class Here(Connection, ABC):
         detail: Any = self.request("GET", f"/studies/{study_id}")
         yield StudyEvent("1", "end", detail["state"], detail["reason"], detail["progress"])
 
-    def _further(self, study_id: str, verb: str, query: Query, body: Any) -> Submission:
+    def _further(self, study_id: str, verb: str, query: Query, body: Any) -> ParsedSpec:
         """The study that a verb makes of another one."""
-        library, now, given = self.library, self.library.store.clock.now(), dict(query)
+        library, given = self.library, dict(query)
         if verb == ":extend":
-            return checks.extended_study(library, study_id, to_bytes(body), "json", None, now, {})
+            return checks.extended_study(library, study_id, Body(to_bytes(body)))
         if verb == ":longer":
             kind = checks.kind_to_run_longer(library.store, study_id, given.get("regime"))
             most = _whole(given, "at_most", MIN_SETTLED_PERIODS, MAX_SETTLED_PERIODS)
-            return checks.longer_study(library, study_id, kind, most, now, {})
+            return checks.longer_study(library, study_id, kind, most)
         if verb == ":narrow":
             held = pairs([text for name, text in query if name == "at"])
             steps = _whole(given, "steps", MIN_NARROW_STEPS, MAX_NARROW_STEPS) or NARROW_STEPS
-            return checks.narrowed_study(library, study_id, steps, held, now, {})
+            return checks.narrowed_study(library, study_id, steps, held)
         if verb == ":select":
             question = asked(SelectQuestion, query)
-            return checks.selected_study(library, study_id, selection(question, question.limit), now, {})
+            return checks.selected_study(library, study_id, selection(question, question.limit))
         raise FaultError("method-not-allowed", "This is for studies of a service: one that was run here has ended.")
 
     def _content(self, study_id: str, part: str, query: Query) -> Iterable[bytes]:

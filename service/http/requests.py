@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated
 
-from fastapi import Header, Request
+from fastapi import Depends, Header, Request
 from fastapi.dependencies.models import Dependant
 from werkzeug.http import parse_etags
 
@@ -15,20 +14,12 @@ from sprag_study.service.faults import ParameterFault, shown
 from sprag_study.service.http.problems import ApiError
 from sprag_study.service.reading.texts import did_you_mean
 from sprag_study.service.spec.report import SpecError
+from sprag_study.service.spec.text import Body, Format
 
-BodyFormat = Literal["json", "toml"]
-_FORMATS: dict[str, BodyFormat] = {"application/json": "json", "application/toml": "toml"}
-
-
-@dataclass(frozen=True, slots=True)
-class Body:
-    """A raw request body, within the size limit of the guard."""
-
-    content: bytes
-    format: BodyFormat
+_FORMATS: dict[str, Format] = {"application/json": "json", "application/toml": "toml"}
 
 
-async def read_body(request: Request) -> Body:
+async def _body(request: Request) -> Body:
     """The body of ``request``, JSON or TOML by its content type; ApiError 415 for any other."""
     declared = request.headers.get("content-type", "")
     media_type, _, parameters = declared.partition(";")
@@ -51,6 +42,9 @@ async def read_body(request: Request) -> Body:
         )
     return Body(await request.body(), form)
 
+
+#: The raw body of a request, within the size limit of the guard.
+Received = Annotated[Body, Depends(_body)]
 
 #: Header by which a change or deletion is meant for what the client has read, and for nothing else.
 IfMatch = Annotated[

@@ -13,9 +13,12 @@ from starlette.requests import ClientDisconnect
 from sprag_study.service import languages
 from sprag_study.service.http.access import OPEN
 from sprag_study.service.http.context import study_with
+from sprag_study.service.http.requests import as_body_problems
 from sprag_study.service.http.respond import streamed
 from sprag_study.service.http.shares import turn
 from sprag_study.service.http.threads import end_moment, in_thread
+from sprag_study.service.jobs import checks
+from sprag_study.service.jobs.submission import Order, take_in
 from sprag_study.service.languages.elsewhere import speak
 from sprag_study.service.results.start_states import check_start
 from sprag_study.service.spec.machine.shaft_check import NotCompiledError
@@ -33,6 +36,9 @@ if TYPE_CHECKING:
     from sprag_study.service.http.computer import Computes
     from sprag_study.service.http.context import Context
     from sprag_study.service.http.shares import Shares
+    from sprag_study.service.spec.document import ParsedSpec
+    from sprag_study.service.spec.text import Body
+    from sprag_study.service.storage.studies.records import StudyRecord
     from sprag_study.worker.models import KernelShape
     from sprag_study.worker.study import Study
 
@@ -61,6 +67,22 @@ class Work:
         except NotCompiledError as error:  # the first use on a machine
             await self.load(error.shape)
             return await self._check(function, *args)
+
+    async def read(self, read: Callable[..., R], body: Body, *args: Any) -> R:
+        """What ``read`` makes of the body of the request, which is no spec; ApiError where it is invalid."""
+        with as_body_problems():
+            return await self.check(checks.of_body, read, body, *args)
+
+    async def submit(
+        self, study: Callable[..., ParsedSpec], *args: Any, key: str | None = None, priority: int = 0, **order: Any
+    ) -> StudyRecord:
+        """Submit the ``study`` that a function of `checks` makes of ``args``, under an idempotency ``key``.
+
+        ``order`` are attributes of an `Order`. Raises as the function and `take_in` do.
+        """
+        asked = Order(self.context.store.clock.now(), **order)
+        made = await self.check(checks.submitted, asked, study, self.context.library, *args)
+        return await in_thread(take_in, self.context.store, made, key, priority)
 
     async def _check(self, function: Callable[[*Args], R], *args: *Args) -> R:
         context = self.context

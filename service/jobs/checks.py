@@ -5,31 +5,28 @@ Their answers are small, or bytes ready to be sent or stored, so that the servic
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import numpy as np
 
 from sprag_study.service.faults import FaultError, parameter_error
 from sprag_study.service.jobs.preview import preview_json
 from sprag_study.service.jobs.start_from import with_start
-from sprag_study.service.jobs.submission import Submission, hash_of, submission
+from sprag_study.service.jobs.submission import Order, Submission, submission
 from sprag_study.service.json_text import to_bytes
 from sprag_study.service.reading import units
 from sprag_study.service.results.fits import fit_json, read_fit
 from sprag_study.service.results.regimes import UNSETTLED
 from sprag_study.service.results.selection import locate_axes
 from sprag_study.service.schedules.fields import ScheduleFields, change_fields, read_fields
-from sprag_study.service.spec.components import Component, read_components
-from sprag_study.service.spec.document import load_spec, parse_spec
+from sprag_study.service.spec.document import parse_spec
 from sprag_study.service.spec.extend import parse_extended
-from sprag_study.service.spec.labels import StudyChange, read_change
 from sprag_study.service.spec.longer import longer_spec, runs_over_time
 from sprag_study.service.spec.machine.shaft_check import compile_elsewhere
 from sprag_study.service.spec.narrow import narrowed_spec, swept_axis
 from sprag_study.service.spec.report import SpecError
-from sprag_study.service.spec.saved_views import View, ViewChange, read_view, read_view_change
 from sprag_study.service.spec.stored import accepted
 from sprag_study.service.views.explore import selection_spec
 from sprag_study.service.views.library import Library
@@ -41,9 +38,12 @@ if TYPE_CHECKING:
 
     from sprag_study.sentences import WarningText
     from sprag_study.service.results.explore import ExploreQuery
-    from sprag_study.service.spec.text import Format
+    from sprag_study.service.spec.document import ParsedSpec
+    from sprag_study.service.spec.text import Body
     from sprag_study.service.storage.store import Store
     from sprag_study.worker.study import Study
+
+R = TypeVar("R")
 
 #: Fields of a schedule by which it is paused and resumed, and the most bytes of a body with them.
 _PAUSING: Final = frozenset({"enabled", "paused_until"})
@@ -66,53 +66,36 @@ def begin(library: Library) -> None:
     models.prepare()
 
 
-def preview(library: Library, content: bytes, form: Format, finish: datetime | None, now: datetime) -> bytes:
+def of_body(read: Callable[..., R], body: Body, *args: Any) -> R:
+    """What ``read`` makes of the data in the body of a request, and of ``args``; raises SpecError and as it does."""
+    return read(body.data(), *args)
+
+
+def preview(library: Library, body: Body, finish: datetime | None, now: datetime) -> bytes:
     """The preview of the spec in a request's body, as JSON text; raises SpecError."""
-    store = library.store
-    parsed = parse_spec(with_start(store, load_spec(content, form)))
+    store, parsed = library.store, new_study(library, body)
     left = None if finish is None else (finish - now).total_seconds()
     return to_bytes(preview_json(parsed, store.dispatchers.chunking, store.reuse.count(parsed.study), left))
 
 
-def components(content: bytes, form: Format) -> list[Component]:
-    """The components in a request's body; raises SpecError."""
-    return read_components(load_spec(content, form))
+def submitted(order: Order, study: Callable[..., ParsedSpec], library: Library, *args: Any) -> Submission:
+    """The submission of the ``study`` that one of the functions below makes of ``args``; raises as it does."""
+    return submission(study(library, *args), library.store, order)
 
 
-def new_study(
-    library: Library,
-    content: bytes,
-    form: Format,
-    fresh: bool,
-    finish: datetime | None,
-    now: datetime,
-    given: Mapping[str, object],
-) -> Submission:
+def new_study(library: Library, body: Body) -> ParsedSpec:
     """The study of the spec in a request's body; raises SpecError."""
-    store = library.store
-    parsed = parse_spec(with_start(store, load_spec(content, form)))
-    return submission(parsed, store, now, fresh, finish, given)
+    return parse_spec(with_start(library.store, body.data()))
 
 
-def extended_study(
-    library: Library,
-    study_id: str,
-    content: bytes,
-    form: Format,
-    finish: datetime | None,
-    now: datetime,
-    given: Mapping[str, object],
-    warnings: Sequence[WarningText] = (),
-) -> Submission:
+def extended_study(library: Library, study_id: str, body: Body, warnings: Sequence[WarningText] = ()) -> ParsedSpec:
     """A study extended by the body of a request, with ``warnings`` about how that was written.
 
     Raises SpecError and StudyNotFoundError.
     """
-    store = library.store
-    study = store.studies.study(study_id)
-    parsed = parse_extended(accepted(store.studies.spec(study_id), study), study, load_spec(content, form))
-    parsed = replace(parsed, warnings=(*warnings, *parsed.warnings))
-    return submission(parsed, store, now, finish_by=finish, given=given)
+    study = library.store.studies.study(study_id)
+    parsed = parse_extended(accepted(library.store.studies.spec(study_id), study), study, body.data())
+    return replace(parsed, warnings=(*warnings, *parsed.warnings))
 
 
 def _refuse_without_time(study: Study) -> None:
@@ -138,13 +121,8 @@ def kind_to_run_longer(store: Store, study_id: str, regime: str | None) -> str:
 
 
 def longer_study(
-    library: Library,
-    study_id: str,
-    kind: str | tuple[int, ...],
-    at_most: int | None,
-    now: datetime,
-    given: Mapping[str, object],
-) -> Submission:
+    library: Library, study_id: str, kind: str | tuple[int, ...], at_most: int | None = None
+) -> ParsedSpec:
     """The cases of a study with that regime, or with that flag where there are no regimes, with more time to settle.
 
     Or the cases of those numbers. There must be at least one. Raises SpecError, StudyNotFoundError, FaultError where
@@ -158,18 +136,10 @@ def longer_study(
         cases = store.rows.cases_of_kind(study_id, **named)
     else:
         cases = np.array(kind, dtype=np.int64)
-    parsed = parse_spec(longer_spec(accepted(store.studies.spec(study_id), study), study, cases, at_most))
-    return submission(parsed, store, now, given=given)
+    return parse_spec(longer_spec(accepted(store.studies.spec(study_id), study), study, cases, at_most))
 
 
-def narrowed_study(
-    library: Library,
-    study_id: str,
-    steps: int,
-    at: Sequence[tuple[str, str]],
-    now: datetime,
-    given: Mapping[str, object],
-) -> Submission:
+def narrowed_study(library: Library, study_id: str, steps: int, at: Sequence[tuple[str, str]] = ()) -> ParsedSpec:
     """The sweep of a study once more, with smaller steps where the motion jumps, at some values of its other axes.
 
     Raises FaultError where there is no jump, SelectionError, SpecError and StudyNotFoundError.
@@ -189,61 +159,31 @@ def narrowed_study(
         cases, indices = cases[indices[axis] == index], tuple(one[indices[axis] == index] for one in indices)
     if not cases.size:
         raise FaultError("wrong-state", "No case of the study has the flag jumped" + (" there." if fixed else "."))
-    parsed = parse_spec(narrowed_spec(accepted(store.studies.spec(study_id), study), study, cases, steps, fixed))
-    return submission(parsed, store, now, given=given)
+    return parse_spec(narrowed_spec(accepted(store.studies.spec(study_id), study), study, cases, steps, fixed))
 
 
-def selected_study(
-    library: Library, study_id: str, query: ExploreQuery, now: datetime, given: Mapping[str, object]
-) -> Submission:
+def selected_study(library: Library, study_id: str, query: ExploreQuery) -> ParsedSpec:
     """The first cases of a selection as points; raises SelectionError, FaultError, SpecError and StudyNotFoundError."""
-    return submission(parse_spec(selection_spec(library, study_id, query)), library.store, now, given=given)
+    return parse_spec(selection_spec(library, study_id, query))
 
 
-def clutch_fit(content: bytes, form: Format) -> bytes:
-    """The report of the fit described in a request's body, as JSON text; raises SpecError."""
-    return to_bytes(fit_json(read_fit(load_spec(content, form))))
+def clutch_fit(data: object) -> bytes:
+    """The report of the fit that ``data`` describes, as JSON text; raises SpecError."""
+    return to_bytes(fit_json(read_fit(data)))
 
 
-def schedule_body(
-    library: Library, content: bytes, form: Format, now: datetime, old: ScheduleFields | None = None
-) -> ScheduleFields:
-    """`schedule_fields` of the body of a request."""
-    return schedule_fields(library, load_spec(content, form), now, old)
-
-
-def only_pauses(content: bytes, form: Format) -> bool:
+def only_pauses(body: Body) -> bool:
     """Whether the body of a change of a schedule does no more than pause or resume it; such a body is short."""
-    if len(content) > _SHORT:
+    if len(body.content) > _SHORT:
         return False
     try:
-        data = load_spec(content, form)
+        data = body.data()
     except SpecError:
         return False
     return isinstance(data, Mapping) and set(data) <= _PAUSING
 
 
-def study_change(content: bytes, form: Format) -> StudyChange:
-    """The change of what people write about a study, as the body of a request has it; raises SpecError."""
-    return read_change(load_spec(content, form))
-
-
-def saved_view(content: bytes, form: Format) -> View:
-    """The view in a request's body; raises SpecError."""
-    return read_view(load_spec(content, form))
-
-
-def saved_view_change(content: bytes, form: Format, page: str) -> ViewChange:
-    """The change of a view of ``page`` in a request's body; raises SpecError."""
-    return read_view_change(load_spec(content, form), page)
-
-
-def body_hash(content: bytes, form: Format) -> str:
-    """`hash_of` the body of a request; raises SpecError when it cannot be read."""
-    return hash_of(load_spec(content, form))
-
-
-def schedule_fields(library: Library, data: object, now: datetime, old: ScheduleFields | None = None) -> ScheduleFields:
+def schedule_fields(data: object, library: Library, now: datetime, old: ScheduleFields | None = None) -> ScheduleFields:
     """The fields of a new schedule, or of an ``old`` one with changes; raises SpecError.
 
     Its studies start from the end of a case as it is now: the schedule stays complete when that study is deleted.

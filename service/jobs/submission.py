@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from sprag_study.sentences import Amount, Sentence
@@ -28,6 +28,25 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
+class Order:
+    """How a study is to be submitted.
+
+    Attributes
+    ----------
+    now : time of the request
+    given : the parameters of the request beside the spec, as the client wrote them: an idempotency key stands for one
+        spec with one set of them, because a deadline "8 h" is a different time in each request
+    fresh : whether cases run that other studies have
+    finish_by : the deadline (UTC)
+    """
+
+    now: datetime
+    given: Mapping[str, object] = field(default_factory=dict)
+    fresh: bool = False
+    finish_by: datetime | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Submission:
     """A checked study, ready to be stored.
 
@@ -39,15 +58,13 @@ class Submission:
         Hash of the spec and the parameters of the request, for the idempotency key.
     bytes : int
         Rough size of its results.
-    fresh, finish_by
-        As for `accept`.
+    order : Order
     """
 
     row: dict[str, Any]
     body_hash: str
     bytes: int
-    fresh: bool = False
-    finish_by: datetime | None = None
+    order: Order
 
 
 def hash_of(asked: object) -> str:
@@ -55,33 +72,17 @@ def hash_of(asked: object) -> str:
     return hashlib.sha256(json.dumps(asked, sort_keys=True).encode("ascii")).hexdigest()
 
 
-def submission(
-    parsed: ParsedSpec,
-    store: Store,
-    now: datetime,
-    fresh: bool = False,
-    finish_by: datetime | None = None,
-    given: Mapping[str, object] | None = None,
-) -> Submission:
-    """The submission of ``parsed`` to ``store``, with all its warnings.
-
-    An idempotency key stands for one spec with one set of ``given`` parameters, as the client wrote them, because a
-    deadline "8 h" is a different time in each request.
-    """
-    asked = [parsed.spec, dict(given)] if given else parsed.spec
+def submission(parsed: ParsedSpec, store: Store, order: Order) -> Submission:
+    """The submission of ``parsed`` to ``store``, with all its warnings."""
+    asked = [parsed.spec, dict(order.given)] if order.given else parsed.spec
     warnings = (*parsed.warnings, *store.dispatchers.chunking.warnings(parsed.study))
-    if finish_by is not None:
-        to_run = most_cases(parsed.study) - (0 if fresh else store.reuse.count(parsed.study))
+    if order.finish_by is not None:
+        to_run = most_cases(parsed.study) - (0 if order.fresh else store.reuse.count(parsed.study))
         seconds = estimated_seconds(parsed.study, store.dispatchers.chunking, to_run)
-        warnings += finish_warnings(parsed.study, seconds, (finish_by - now).total_seconds())
+        warnings += finish_warnings(parsed.study, seconds, (order.finish_by - order.now).total_seconds())
     size = estimated_bytes(parsed.study)
-    return Submission(
-        {**study_row(parsed.spec, parsed.study, store.dispatchers.chunking, warnings), "estimated_bytes": size},
-        hash_of(asked),
-        size,
-        fresh,
-        finish_by,
-    )
+    row = {**study_row(parsed.spec, parsed.study, store.dispatchers.chunking, warnings), "estimated_bytes": size}
+    return Submission(row, hash_of(asked), size, order)
 
 
 def accept(
@@ -93,7 +94,7 @@ def accept(
     run: OpenRun | None = None,
 ) -> StudyRecord:
     """Accept a study with its warnings; errors as of `take_in`."""
-    made = submission(parsed, store, store.clock.now(), fresh, finish_by)
+    made = submission(parsed, store, Order(store.clock.now(), fresh=fresh, finish_by=finish_by))
     return take_in(store, made, priority=priority, run=run)
 
 
@@ -117,8 +118,8 @@ def take_in(
         idempotency_key=idempotency_key,
         body_hash=made.body_hash,
         priority=priority,
-        fresh=made.fresh,
-        finish_by=made.finish_by,
+        fresh=made.order.fresh,
+        finish_by=made.order.finish_by,
         run=run,
         queue=MAX_WAITING_STUDIES,
     )

@@ -6,6 +6,7 @@ import json
 import math
 import re
 import tomllib
+from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from sprag_study.sentences import Sentence, plural
@@ -36,6 +37,18 @@ _TOML_TOKEN: Final = re.compile(
     r"|\#[^\n]*+|[\w+\-]++|[ \t]++|.",
     re.DOTALL,
 )
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """The text of a spec, or of another body of a request, in its format."""
+
+    content: bytes
+    format: Format = "json"
+
+    def data(self) -> object:
+        """Its plain data, as of `load_spec`; raises SpecError."""
+        return load_spec(self.content, self.format)
 
 
 class _Repeated(dict[str, Any]):

@@ -4,25 +4,24 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Final, Literal
 
-from fastapi import Depends, Path, Query, Request
+from fastapi import Path, Query, Request
 from starlette.responses import Response
 
 from sprag_study.service.answers import components as m
 from sprag_study.service.answers import filled
 from sprag_study.service.exports.components import COMPONENT_FORMATS, components_csv
-from sprag_study.service.http.api.document import body, files, format_query, problems
+from sprag_study.service.http.api.document import BODY_PROBLEMS, DELETES, body, files, format_query, problems
 from sprag_study.service.http.context import ID_PATTERN, Ctx
-from sprag_study.service.http.requests import Body, IfMatch, as_body_problems, editions, read_body
+from sprag_study.service.http.requests import IfMatch, Received, editions
 from sprag_study.service.http.respond import choose_format, json_response
 from sprag_study.service.http.routers import api_router
 from sprag_study.service.http.threads import in_thread
-from sprag_study.service.http.work import CHECK_PROBLEMS, Attended
-from sprag_study.service.jobs import checks
+from sprag_study.service.http.work import Attended
+from sprag_study.service.spec.components import read_components
 from sprag_study.service.storage.components import ComponentRecord
 
 router = api_router("components")
 
-_BODY_PROBLEMS: Final = ("invalid-parameter", "invalid-body", "body-too-large", "unsupported-media-type")
 EXAMPLE: Final[dict[str, Any]] = {
     "components": [
         {"kind": "spring", "name": "F-120", "note": "store 3", "fields": {"spring_rate": "9 N/mm"}},
@@ -65,21 +64,18 @@ def list_components(
 @router.post(
     "/components",
     response_model=m.ComponentList,
-    responses=problems(*_BODY_PROBLEMS, *CHECK_PROBLEMS, "not-owner", "wrong-state"),
-    openapi_extra=body({"a spring and a clutch": EXAMPLE}, {"$ref": "#/components/schemas/Components"}),
+    responses=problems(*BODY_PROBLEMS, "not-owner", "wrong-state"),
+    openapi_extra=body({"a spring and a clutch": EXAMPLE}, "Components"),
 )
-async def put_components(context: Ctx, work: Attended, received: Annotated[Body, Depends(read_body)]) -> Response:
+async def put_components(context: Ctx, work: Attended, received: Received) -> Response:
     """Add components, all or none; those of the same kind and name are replaced. CSV is sent as `{"csv": text}`."""
-    with as_body_problems():
-        given = await work.check(checks.components, received.content, received.format)
-    made = await in_thread(context.store.components.put, given)
-    return json_response({"components": list(map(entry, made))})
+    records = await in_thread(context.store.components.put, await work.read(read_components, received))
+    return json_response({"components": list(map(entry, records))})
 
 
 @router.delete(
     "/components/{component_id}",
-    status_code=204,
-    response_class=Response,
+    **DELETES,
     responses=problems("component-not-found", "invalid-parameter", "not-owner", "precondition-failed"),
 )
 def delete_component(

@@ -8,6 +8,7 @@ from typing import Any, Final, cast
 
 from fastapi import FastAPI, Header, Query
 from fastapi.openapi.utils import get_openapi
+from starlette.responses import Response
 from typing_extensions import is_typeddict
 
 from sprag_study.service.answers import catalogue, people, results, saved_views, schedules, studies
@@ -18,6 +19,7 @@ from sprag_study.service.http.api.plain_schema import plain_schema
 from sprag_study.service.http.asked import one_of
 from sprag_study.service.http.problems import PROBLEM_MEDIA_TYPE, PROBLEM_TYPES, Problem, ProblemType, problem_json
 from sprag_study.service.http.views import API_PREFIX
+from sprag_study.service.http.work import CHECK_PROBLEMS
 
 _METRICS: Final = "/metrics"
 _SCHEMAS: Final = "#/components/schemas/"
@@ -27,6 +29,10 @@ _EVERYWHERE: Final = ("unauthorized", "too-many-attempts", "wrong-host", "intern
 CASE_PROBLEMS: Final = (
     "invalid-parameter", "study-not-found", "case-not-found", "not-found", "not-acceptable", "not-computed",
     "timed-out", "too-many-requests", "unavailable",
+)  # fmt: skip
+#: Problems of operations that read a body which is no spec.
+BODY_PROBLEMS: Final = (
+    "invalid-parameter", "invalid-body", "body-too-large", "unsupported-media-type", *CHECK_PROBLEMS,
 )  # fmt: skip
 _UNSAFE: Final = ("cross-site", "read-only", "too-slow")
 
@@ -106,13 +112,20 @@ def key_header(example: str, once: str) -> Any:
     )
 
 
-def body(examples: dict[str, Any], schema: dict[str, Any], toml: str | None = None) -> dict[str, Any]:
-    """``openapi_extra`` for an operation that reads its own body; ``examples`` are whole JSON bodies by name."""
+def body(examples: dict[str, Any], schema: str, toml: str | None = None) -> dict[str, Any]:
+    """``openapi_extra`` for an operation that reads its own body.
+
+    ``examples`` are whole JSON bodies by name, ``schema`` is the name of theirs among the components of the document.
+    """
     named = {name: {"summary": name, "value": value} for name, value in examples.items()}
-    content: dict[str, Any] = {"application/json": {"schema": schema, "examples": named}}
+    content: dict[str, Any] = {"application/json": {"schema": {"$ref": _SCHEMAS + schema}, "examples": named}}
     if toml is not None:
         content["application/toml"] = {"schema": {"type": "string"}, "examples": {"TOML": {"value": toml}}}
     return {"requestBody": {"required": True, "content": content}}
+
+
+#: What the operations that delete something have in common.
+DELETES: Final[dict[str, Any]] = {"status_code": 204, "response_class": Response}
 
 
 def files(description: str, media_types: Iterable[str]) -> Responses:

@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated, Any, Final
 
-from fastapi import Depends, Path, Query
+from fastapi import Path, Query
 from starlette.convertors import register_url_convertor
 from starlette.responses import Response
 
 from sprag_study.service.answers import schedules as m
 from sprag_study.service.http.api import examples
-from sprag_study.service.http.api.document import body, key_header, located, problems
+from sprag_study.service.http.api.document import BODY_PROBLEMS, DELETES, body, key_header, located, problems
 from sprag_study.service.http.context import ID_PATTERN, Context, Ctx, StudyIdConvertor
-from sprag_study.service.http.requests import Body, IfMatch, as_body_problems, editions, read_body
+from sprag_study.service.http.requests import IfMatch, Received, as_body_problems, editions
 from sprag_study.service.http.respond import edition_tag, json_response, tagged
 from sprag_study.service.http.routers import api_router
 from sprag_study.service.http.schedule_views import detail, listed, schedule_address
 from sprag_study.service.http.threads import in_thread
-from sprag_study.service.http.work import CHECK_PROBLEMS, Attended, Work
+from sprag_study.service.http.work import Attended, Work
 from sprag_study.service.jobs import checks
 from sprag_study.service.jobs.nights import HOURS, MOST_HOURS, night
+from sprag_study.service.jobs.submission import hash_of
 from sprag_study.service.schedules.deadline import ALLOWED_OF_RUNS
 from sprag_study.service.schedules.fields import PLAIN, ScheduleFields
 from sprag_study.service.schedules.policies import GRACE_ALLOWED
@@ -34,7 +36,6 @@ from sprag_study.worker.limits import MAX_NAME_LENGTH
 
 router = api_router("schedules")
 
-_PROBLEMS: Final = ("invalid-parameter", "invalid-body", "body-too-large", "unsupported-media-type")
 #: Attempts to change a schedule that somebody else changes at the same time.
 _ATTEMPTS: Final = 5
 _TIME_OF_DAY: Final = {"type": "string", "pattern": "^([01]?[0-9]|2[0-3]):[0-5][0-9]$"}
@@ -133,7 +134,6 @@ register_url_convertor("schedule", ScheduleIdConvertor())
 ScheduleId = Annotated[
     str, Path(description="id of the schedule", pattern=ID_PATTERN, examples=["sc_0123456789abcdef"])
 ]
-Fields = Annotated[Body, Depends(read_body)]
 IdempotencyKey = Annotated[
     str | None,
     key_header("0b6e9a52-nights", "the same key with the same body creates the schedule once, even if sent repeatedly"),
@@ -144,11 +144,11 @@ IdempotencyKey = Annotated[
     "/schedules",
     status_code=201,
     response_model=m.ScheduleDetail,
-    responses=located(201) | problems(*_PROBLEMS, *CHECK_PROBLEMS, "idempotency-conflict", "wrong-state"),
-    openapi_extra=body({"every working night": EXAMPLE}, {"$ref": "#/components/schemas/ScheduleRequest"}),
+    responses=located(201) | problems(*BODY_PROBLEMS, "idempotency-conflict", "wrong-state"),
+    openapi_extra=body({"every working night": EXAMPLE}, "ScheduleRequest"),
 )
 async def create_schedule(
-    context: Ctx, work: Attended, received: Fields, idempotency_key: IdempotencyKey = None
+    context: Ctx, work: Attended, received: Received, idempotency_key: IdempotencyKey = None
 ) -> Response:
     """Create a schedule: its study is submitted whenever it is due; for missed due times, once."""
     store = context.store
@@ -159,8 +159,7 @@ async def create_schedule(
     if idempotency_key is None:
         return await in_thread(keep, await _fields(context, work, received, None), None, "")
     # Before the fields are read: a future time may have passed since the key was first sent.
-    with as_body_problems():
-        body_hash = await work.check(checks.body_hash, received.content, received.format)
+    body_hash = await work.read(hash_of, received)
     known = await in_thread(store.schedules.of_key, idempotency_key, body_hash)
     if known is not None:
         return await in_thread(_made, context, known)
@@ -182,13 +181,13 @@ def _made(context: Context, record: ScheduleRecord) -> Response:
     return json_response(content, 201, {"Location": schedule_address(record.id)})
 
 
-async def _fields(context: Context, work: Work, received: Body, old: ScheduleFields | None) -> ScheduleFields:
+async def _fields(context: Context, work: Work, received: Received, old: ScheduleFields | None) -> ScheduleFields:
     with as_body_problems():
         now = context.store.clock.now()
         # Whoever pauses a schedule does not wait for a process, of which a service that has just started has none yet.
-        quick = old is not None and checks.only_pauses(received.content, received.format)
-        asked = (context.library, received.content, received.format, now, old)
-        fields = await (in_thread if quick else work.check)(checks.schedule_body, *asked)
+        quick = old is not None and checks.only_pauses(received)
+        read = partial(checks.of_body, checks.schedule_fields, received, context.library, now, old)
+        fields = await (in_thread(read) if quick else work.check(read))
         if old is None or fields.report_to != old.report_to:
             require_deliverable(fields.report_to, context.settings.reports)
         return fields
@@ -222,13 +221,11 @@ def get_schedule(context: Ctx, schedule_id: ScheduleId) -> Response:
 @router.patch(
     "/schedules/{schedule_id:schedule}",
     response_model=m.ScheduleDetail,
-    responses=problems(*_PROBLEMS, *CHECK_PROBLEMS, "schedule-not-found", "precondition-failed"),
-    openapi_extra=body(
-        {"paused": {"paused_until": "2027-01-07T00:00"}}, {"$ref": "#/components/schemas/ScheduleChange"}
-    ),
+    responses=problems(*BODY_PROBLEMS, "schedule-not-found", "precondition-failed"),
+    openapi_extra=body({"paused": {"paused_until": "2027-01-07T00:00"}}, "ScheduleChange"),
 )
 async def change_schedule(
-    context: Ctx, work: Attended, schedule_id: ScheduleId, received: Fields, if_match: IfMatch = None
+    context: Ctx, work: Attended, schedule_id: ScheduleId, received: Received, if_match: IfMatch = None
 ) -> Response:
     """Change some fields of a schedule; the others are kept. Due times missed before the change are dropped."""
     store, wanted = context.store, editions(if_match)
@@ -249,8 +246,7 @@ async def change_schedule(
 
 @router.delete(
     "/schedules/{schedule_id:schedule}",
-    status_code=204,
-    response_class=Response,
+    **DELETES,
     responses=problems("invalid-parameter", "schedule-not-found", "precondition-failed"),
 )
 def delete_schedule(context: Ctx, schedule_id: ScheduleId, if_match: IfMatch = None) -> Response:

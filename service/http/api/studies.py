@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
-from fastapi import Depends, Query, Request
+from fastapi import Query, Request
 from pydantic import Field
 from starlette.responses import Response
 
@@ -17,13 +17,12 @@ from sprag_study.service.http.api.document import body, key_header, located, pro
 from sprag_study.service.http.api.document import not_modified as documented_304
 from sprag_study.service.http.asked import one_of
 from sprag_study.service.http.context import Context, Ctx, StudyId
-from sprag_study.service.http.requests import Body, read_body
+from sprag_study.service.http.requests import Received
 from sprag_study.service.http.respond import JSON, json_response, not_modified, tagged
 from sprag_study.service.http.routers import api_router
 from sprag_study.service.http.threads import in_thread
 from sprag_study.service.http.work import CHECK_PROBLEMS, Attended
 from sprag_study.service.jobs import checks
-from sprag_study.service.jobs.submission import Submission, take_in
 from sprag_study.service.results.rounds import round_json
 from sprag_study.service.schedules.deadline import ALLOWED, FinishError, finish_at
 from sprag_study.service.views.curves import pairs
@@ -37,13 +36,24 @@ from sprag_study.worker.limits import (
 )
 from sprag_study.worker.models import ENDING_SENTENCES, OK, REGIME_SENTENCES, WorkerEnding
 
+if TYPE_CHECKING:
+    from sprag_study.service.storage.studies.records import StudyRecord
+
 router = api_router("studies")
 
-_SPEC_BODY = body({"a grid of two axes": examples.SPEC}, {"$ref": "#/components/schemas/Spec"}, toml=examples.SPEC_TOML)
+_SPEC_BODY = body({"a grid of two axes": examples.SPEC}, "Spec", toml=examples.SPEC_TOML)
 _FAILED = [str(name) for name in ENDING_SENTENCES if name not in {OK, WorkerEnding.CANCELLED}]
-_BODY_PROBLEMS = ("invalid-parameter", "invalid-spec", "body-too-large", "unsupported-media-type")
+_SPEC_PROBLEMS = ("body-too-large", "unsupported-media-type")
 
-SpecBody = Annotated[Body, Depends(read_body)]
+
+def submits(*refused: str) -> dict[str, Any]:
+    """What operations that submit a study have in common; each may be ``refused`` for further reasons."""
+    every = ("invalid-parameter", "invalid-spec", *CHECK_PROBLEMS, "idempotency-conflict", "storage-full", "queue-full")
+    return {
+        "status_code": 202,
+        "response_model": m.StudySummary,
+        "responses": located(202) | problems(*every, *refused),
+    }
 
 
 _ONCE = "the same key with the same body and parameters submits the study once, however often it is sent"
@@ -81,18 +91,11 @@ def _finish(context: Context, text: str | None) -> datetime | None:
         raise parameter_error("finish_by", error.code, error.message, text, ALLOWED) from None
 
 
-@router.post(
-    "/studies",
-    status_code=202,
-    response_model=m.StudySummary,
-    responses=located(202)
-    | problems(*_BODY_PROBLEMS, *CHECK_PROBLEMS, "idempotency-conflict", "storage-full", "queue-full"),
-    openapi_extra=_SPEC_BODY,
-)
+@router.post("/studies", **submits(*_SPEC_PROBLEMS), openapi_extra=_SPEC_BODY)
 async def create_study(
     context: Ctx,
     work: Attended,
-    received: SpecBody,
+    received: Received,
     idempotency_key: IdempotencyKey = None,
     priority: Priority = 0,
     fresh: Annotated[
@@ -105,12 +108,12 @@ async def create_study(
     Its cases are run in the order of their numbers; with `finish_by` coarse to fine, in passes that are complete
     coarser grids, so that the finished cases form complete curves.
     """
-    finish, now = _finish(context, finish_by), context.store.clock.now()
-    given = given_options(priority=priority, fresh=fresh, finish_by=finish_by)
-    made = await work.check(
-        checks.new_study, context.library, received.content, received.format, fresh, finish, now, given
-    )
-    return await in_thread(taken_in, context, made, idempotency_key, priority)
+    record = await work.submit(
+        checks.new_study, received, key=idempotency_key, priority=priority, fresh=fresh,
+        given=given_options(priority=priority, fresh=fresh, finish_by=finish_by),
+        finish_by=_finish(context, finish_by),
+    )  # fmt: skip
+    return submitted(record)
 
 
 def given_options(**options: object) -> dict[str, object]:
@@ -118,22 +121,21 @@ def given_options(**options: object) -> dict[str, object]:
     return {name: value for name, value in options.items() if value}
 
 
-def taken_in(context: Context, made: Submission, idempotency_key: str | None, priority: int) -> Response:
-    """Store a study and answer with it; errors as of `take_in`."""
-    record = take_in(context.store, made, idempotency_key, priority)
+def submitted(record: StudyRecord) -> Response:
+    """The answer with a study that was submitted."""
     return json_response(views.summary(record), 202, {"Location": views.study_address(record.id)})
 
 
 @router.post(
     "/studies:preview",
     response_model=m.Preview,
-    responses=problems(*_BODY_PROBLEMS, *CHECK_PROBLEMS),
+    responses=problems("invalid-parameter", "invalid-spec", *_SPEC_PROBLEMS, *CHECK_PROBLEMS),
     openapi_extra=_SPEC_BODY,
 )
-async def preview_study(context: Ctx, work: Attended, received: SpecBody, finish_by: FinishBy = None) -> Response:
+async def preview_study(context: Ctx, work: Attended, received: Received, finish_by: FinishBy = None) -> Response:
     """Preview of a study: cases, time, size, warnings and fitted clutch laws. Nothing is submitted."""
     finish, now = _finish(context, finish_by), context.store.clock.now()
-    text = await work.check(checks.preview, context.library, received.content, received.format, finish, now)
+    text = await work.check(checks.preview, context.library, received, finish, now)
     return Response(text, media_type=JSON)
 
 
@@ -214,50 +216,30 @@ def retry_study(
 
 @router.post(
     "/studies/{study_id:study}:extend",
-    status_code=202,
-    response_model=m.StudySummary,
-    responses=located(202)
-    | problems(
-        *_BODY_PROBLEMS, *CHECK_PROBLEMS, "study-not-found", "idempotency-conflict", "storage-full", "queue-full"
-    ),
+    **submits(*_SPEC_PROBLEMS, "study-not-found"),
     openapi_extra=body(
         {"further loads": examples.EXTENSION_AXES, "further cases": examples.EXTENSION_CASES},
-        {"$ref": "#/components/schemas/Extension"},
+        "Extension",
     ),
 )
 async def extend_study(
     context: Ctx,
     work: Attended,
     study_id: StudyId,
-    received: SpecBody,
+    received: Received,
     idempotency_key: ExtensionKey = None,
     priority: Priority = 0,
     finish_by: FinishBy = None,
 ) -> Response:
     """Submit a study with more values on the axes of an old one, or more cases; only new cases are run."""
-    finish, now = _finish(context, finish_by), context.store.clock.now()
-    given = given_options(priority=priority, finish_by=finish_by)
-    made = await work.check(
-        checks.extended_study, context.library, study_id, received.content, received.format, finish, now, given
-    )
-    return await in_thread(taken_in, context, made, idempotency_key, priority)
+    record = await work.submit(
+        checks.extended_study, study_id, received, key=idempotency_key, priority=priority,
+        given=given_options(priority=priority, finish_by=finish_by), finish_by=_finish(context, finish_by),
+    )  # fmt: skip
+    return submitted(record)
 
 
-@router.post(
-    "/studies/{study_id:study}:longer",
-    status_code=202,
-    response_model=m.StudySummary,
-    responses=located(202)
-    | problems(
-        "invalid-parameter",
-        *CHECK_PROBLEMS,
-        "study-not-found",
-        "invalid-spec",
-        "idempotency-conflict",
-        "storage-full",
-        "queue-full",
-    ),
-)
+@router.post("/studies/{study_id:study}:longer", **submits("study-not-found"))
 async def run_longer(
     context: Ctx,
     work: Attended,
@@ -283,30 +265,11 @@ async def run_longer(
     """Submit a study of the unsettled cases of a study, with more time for each."""
     kind = await in_thread(checks.kind_to_run_longer, context.store, study_id, regime)
     given = given_options(regime=regime, at_most=at_most)
-    now = context.store.clock.now()
-    made = await work.check(checks.longer_study, context.library, study_id, kind, at_most, now, given)
-    return await in_thread(taken_in, context, made, idempotency_key, 0)
+    return submitted(await work.submit(checks.longer_study, study_id, kind, at_most, key=idempotency_key, given=given))
 
 
-@router.post(
-    "/studies/{study_id:study}:narrow",
-    status_code=202,
-    response_model=m.StudySummary,
-    responses=located(202)
-    | problems(
-        "invalid-parameter",
-        "invalid-selection",
-        *CHECK_PROBLEMS,
-        "study-not-found",
-        "wrong-state",
-        "invalid-spec",
-        "idempotency-conflict",
-        "storage-full",
-        "queue-full",
-    ),
-)
+@router.post("/studies/{study_id:study}:narrow", **submits("invalid-selection", "study-not-found", "wrong-state"))
 async def narrow_study(
-    context: Ctx,
     work: Attended,
     study_id: StudyId,
     steps: Annotated[
@@ -328,9 +291,10 @@ async def narrow_study(
     idempotency_key: NarrowKey = None,
 ) -> Response:
     """Submit the sweep of a study again, with smaller steps where its motion jumps."""
-    now, given = context.store.clock.now(), given_options(steps=steps, at=at)
-    made = await work.check(checks.narrowed_study, context.library, study_id, steps, pairs(at), now, given)
-    return await in_thread(taken_in, context, made, idempotency_key, 0)
+    given = given_options(steps=steps, at=at)
+    return submitted(
+        await work.submit(checks.narrowed_study, study_id, steps, pairs(at), key=idempotency_key, given=given)
+    )
 
 
 @router.post(

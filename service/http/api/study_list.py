@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import Depends, Query, Request
+from fastapi import Query, Request
 from starlette.responses import Response
 
 from sprag_study.service.answers import studies as m
 from sprag_study.service.answers.studies import StudyOrder
 from sprag_study.service.http import views
-from sprag_study.service.http.api.document import body, next_page, problems
+from sprag_study.service.http.api.document import BODY_PROBLEMS, DELETES, body, next_page, problems
 from sprag_study.service.http.context import Ctx, StudyId
 from sprag_study.service.http.listing import PageToken, Sort, WantedStudies
-from sprag_study.service.http.requests import Body, IfMatch, as_body_problems, editions, read_body
+from sprag_study.service.http.requests import IfMatch, Received, editions
 from sprag_study.service.http.respond import json_response, page_response, tagged
 from sprag_study.service.http.routers import api_router
 from sprag_study.service.http.threads import in_thread
-from sprag_study.service.http.work import CHECK_PROBLEMS, Attended
-from sprag_study.service.jobs import checks
+from sprag_study.service.http.work import Attended
+from sprag_study.service.spec.labels import read_change
 from sprag_study.worker.limits import MAX_PAGE_SIZE
 
 router = api_router("studies")
@@ -42,29 +42,20 @@ def list_studies(
 @router.patch(
     "/studies/{study_id:study}",
     response_model=m.StudySummary,
-    responses=problems(
-        "invalid-parameter",
-        "invalid-body",
-        "body-too-large",
-        "unsupported-media-type",
-        *CHECK_PROBLEMS,
-        "study-not-found",
-        "precondition-failed",
-        "quota-exceeded",
-    ),
+    responses=problems(*BODY_PROBLEMS, "study-not-found", "precondition-failed", "quota-exceeded"),
     openapi_extra=body(
         {
             "a name and a tag": {"name": "Feeder, softer clutch", "add_tags": ["customer 7"]},
             "archived": {"archived": True},
         },
-        {"$ref": "#/components/schemas/StudyChange"},
+        "StudyChange",
     ),
 )
 async def change_study(
     context: Ctx,
     work: Attended,
     study_id: StudyId,
-    received: Annotated[Body, Depends(read_body)],
+    received: Received,
     if_match: IfMatch = None,
 ) -> Response:
     """Change what people write about a study: name, notes, tags, and whether it is archived.
@@ -72,16 +63,14 @@ async def change_study(
     Fields that are left out are kept. Nothing that is computed changes, and its spec keeps the name with which it was
     submitted.
     """
-    with as_body_problems():
-        change = await work.check(checks.study_change, received.content, received.format)
-        record = await in_thread(context.store.studies.change, study_id, change, editions(if_match))
+    change = await work.read(read_change, received)
+    record = await in_thread(context.store.studies.change, study_id, change, editions(if_match))
     return tagged(json_response(views.summary(record)), views.study_tag(record))
 
 
 @router.delete(
     "/studies/{study_id:study}",
-    status_code=204,
-    response_class=Response,
+    **DELETES,
     responses=problems("invalid-parameter", "study-not-found", "wrong-state", "precondition-failed"),
 )
 def delete_study(

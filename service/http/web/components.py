@@ -39,8 +39,10 @@ from sprag_study.service.spec.components import (
     list_text,
     model_of_kind,
     needed,
+    read_components,
     require_component,
 )
+from sprag_study.service.spec.text import Body
 from sprag_study.service.storage.errors import ComponentNotFoundError
 from sprag_study.worker.limits import MAX_COMPONENTS
 from sprag_study.worker.models.parameters import placed
@@ -142,7 +144,7 @@ async def put_component(context: Ctx, work: Attended, values: Form) -> Response:
     settle(values, with_ticks=False)
     try:
         if csv:
-            given = await work.check(checks.components, to_bytes({"csv": values.get("csv", "")}), "json")
+            given = await work.check(checks.of_body, read_components, Body(to_bytes({"csv": values.get("csv", "")})))
         else:
             given = [_component(values)]
         await in_thread(context.store.components.put, given)

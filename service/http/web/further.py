@@ -13,16 +13,15 @@ from sprag_study.sentences import Place, Sentence, WarningText
 from sprag_study.service.faults import FaultError, parameter_error
 from sprag_study.service.http.context import Ctx, StudyId
 from sprag_study.service.http.routers import page_router
-from sprag_study.service.http.threads import in_thread
 from sprag_study.service.http.web.form.entries import Faults, Values, items_of, list_of
 from sprag_study.service.http.web.form.values import Form
 from sprag_study.service.http.web.sheet.drawer import with_query
 from sprag_study.service.http.web.study import shown_study
 from sprag_study.service.http.work import Attended
 from sprag_study.service.jobs import checks
-from sprag_study.service.jobs.submission import take_in
 from sprag_study.service.reading.faults import message
 from sprag_study.service.reading.numbers import assumption, parse_number, settle
+from sprag_study.service.spec.text import Body
 from sprag_study.worker.limits import MAX_PRIORITY
 
 if TYPE_CHECKING:
@@ -51,19 +50,15 @@ async def extend(context: Ctx, work: Attended, study_id: StudyId, values: Form) 
 
     Where it is not valid, the page of the study again, with what is wrong beside the fields.
     """
-    now = context.store.clock.now()
     try:
         content = json.dumps(_addition(values), sort_keys=True).encode()
-        made = await work.check(
-            checks.extended_study, context.library, study_id, content, "json", None, now, {}, _doubts(values)
-        )
+        # Pressed twice, it submits one study.
+        key = f"extend-{study_id}-{hashlib.sha256(content).hexdigest()[:32]}"
+        record = await work.submit(checks.extended_study, study_id, Body(content), _doubts(values), key=key)
     except FaultError as error:
         if not error.faults:
             raise
         return await shown_study(context, work, study_id, values, _wrong(values, error.faults))
-    # Pressed twice, it submits one study.
-    key = f"extend-{study_id}-{hashlib.sha256(content).hexdigest()[:32]}"
-    record = await in_thread(take_in, context.store, made, key)
     point = values.get("point", "").strip()
     return RedirectResponse(with_query(f"/studies/{record.id}", [("point", point)] if point else []), status_code=303)
 

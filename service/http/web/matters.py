@@ -40,13 +40,13 @@ from sprag_study.service.http.web.templates import page
 from sprag_study.service.http.web.view_forms import Asked, Seen, asked_of, fact_of, files_of, inline
 from sprag_study.service.http.work import Attended
 from sprag_study.service.jobs import checks
-from sprag_study.service.jobs.submission import take_in
 from sprag_study.service.languages import N_
 from sprag_study.service.results.choice import held
 from sprag_study.service.results.headlines.batch import with_yield
 from sprag_study.service.results.headlines.headline import Headline
 from sprag_study.service.results.headlines.influence import influence_headline
 from sprag_study.service.spec.stored import accepted
+from sprag_study.service.spec.text import Body
 from sprag_study.service.views.batch import batch_shown
 from sprag_study.service.views.drives import RibbonView
 from sprag_study.service.views.headline import headline_of
@@ -60,7 +60,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from sprag_study.service.http.work import Work
-    from sprag_study.service.jobs.submission import Submission
     from sprag_study.service.reading.reader import Choice
     from sprag_study.service.views.library import Library
     from sprag_study.worker.study import Study
@@ -221,18 +220,12 @@ async def send_points(context: Ctx, work: Attended, values: Form) -> Response:
     study = await in_thread(context.store.studies.study, study_id)
     content = json.dumps(calibrate.calibration_spec(await in_thread(accepted, spec, study), values)).encode()
     try:
-        made = await work.check(
-            checks.new_study, context.library, content, "json", False, None, context.store.clock.now(), {}
-        )
-        return await in_thread(_submit, context, made)
+        record = await work.submit(checks.new_study, Body(content))
     except FaultError as error:
         faults = error.faults or (Fault(None, "conflict", error.detail),)
         status = api_error(error).type.status
         return await answered(work, study_id, "measurement", values, faults, status)
-
-
-def _submit(context: Context, made: Submission) -> Response:
-    return RedirectResponse(f"/studies/{take_in(context.store, made).id}", status_code=303)
+    return RedirectResponse(f"/studies/{record.id}", status_code=303)
 
 
 def _add(old: str, ask: str) -> None:

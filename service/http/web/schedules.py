@@ -152,7 +152,7 @@ async def _save(context: Context, work: Work, values: Values, schedule_id: str |
     faults: dict[str, list[str]] = {}
     try:
         data, old = await in_thread(_asked, context, values, schedule_id)
-        fields = await work.check(checks.schedule_fields, work.context.library, data, now, old)
+        fields = await work.check(checks.schedule_fields, data, work.context.library, now, old)
         if old is None or fields.report_to != old.report_to:
             require_deliverable(fields.report_to, context.settings.reports)
         if schedule_id is None:

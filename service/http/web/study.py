@@ -27,7 +27,6 @@ from sprag_study.service.http.web.sheet.view import sheet_of
 from sprag_study.service.http.web.templates import page
 from sprag_study.service.http.work import Attended, Work
 from sprag_study.service.jobs import checks
-from sprag_study.service.jobs.submission import take_in
 from sprag_study.service.json_text import timestamp
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.directions import ends_in_words
@@ -237,21 +236,18 @@ async def run_longer(context: Ctx, work: Attended, study_id: StudyId, kind: str)
     counts = await in_thread(find)
     if kind not in counts:
         raise ApiError("not-found", Sentence("This study has no such case."))
-    now = context.store.clock.now()
-    made = await work.check(checks.longer_study, context.library, study_id, kind, None, now, {})
     # Pressed twice, it submits one study, unless more cases of this kind have finished.
     key = f"longer-{study_id}-{kind}-{counts[kind]}"
-    record = await in_thread(take_in, context.store, made, key)
+    record = await work.submit(checks.longer_study, study_id, kind, key=key)
     return RedirectResponse(f"/studies/{record.id}", status_code=303)
 
 
 @router.post("/studies/{study_id:study}/narrow")
 async def narrow(context: Ctx, work: Attended, study_id: StudyId) -> Response:
     """The button beside the count of jumps: submit the sweep once more, with smaller steps there."""
-    now, revision = context.store.clock.now(), (await in_thread(context.store.studies.get, study_id)).revision
-    made = await work.check(checks.narrowed_study, context.library, study_id, NARROW_STEPS, (), now, {})
+    revision = (await in_thread(context.store.studies.get, study_id)).revision
     # Pressed twice, it submits one study.
-    record = await in_thread(take_in, context.store, made, f"narrow-{study_id}-{revision}")
+    record = await work.submit(checks.narrowed_study, study_id, NARROW_STEPS, key=f"narrow-{study_id}-{revision}")
     return RedirectResponse(f"/studies/{record.id}", status_code=303)
 
 

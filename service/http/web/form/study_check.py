@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from sprag_study.service.http.web.form.check import Checked, look_over
-from sprag_study.service.jobs.submission import Submission, submission
+from sprag_study.service.jobs.submission import Order, Submission, submission
 from sprag_study.service.views.library import Library
 
 if TYPE_CHECKING:
@@ -29,5 +29,5 @@ def form_study(library: Library, values: Mapping[str, str], now: datetime) -> tu
     checked = look_over(values, store.dispatchers.chunking, store.reuse.count, now)
     made = None
     if checked.parsed is not None:
-        made = submission(checked.parsed, store, now, finish_by=checked.finish)
+        made = submission(checked.parsed, store, Order(now, finish_by=checked.finish))
     return replace(checked, parsed=None), made

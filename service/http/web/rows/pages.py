@@ -30,7 +30,6 @@ from sprag_study.service.http.web.study import study_frame
 from sprag_study.service.http.web.templates import page
 from sprag_study.service.http.work import Attended
 from sprag_study.service.jobs import checks
-from sprag_study.service.jobs.submission import take_in
 from sprag_study.service.json_text import to_bytes
 from sprag_study.service.languages import _
 from sprag_study.service.reading.faults import message
@@ -198,11 +197,9 @@ async def run_rows_longer(context: Ctx, work: Attended, study_id: StudyId, field
     cases = sorted(case for case in found if case is not None)
     if not cases or None in found:
         raise refused("case", "required", "no case is selected")
-    now = context.store.clock.now()
-    made = await work.check(checks.longer_study, context.library, study_id, tuple(cases), None, now, {})
     # Pressed twice, it submits one study.
     digest = hashlib.sha256(repr(cases).encode()).hexdigest()[:32]
-    record = await in_thread(take_in, context.store, made, f"longer-{study_id}-{digest}")
+    record = await work.submit(checks.longer_study, study_id, tuple(cases), key=f"longer-{study_id}-{digest}")
     return RedirectResponse(f"/studies/{record.id}", status_code=303)
 
 
