@@ -243,7 +243,7 @@ def test_a_study_and_what_it_gives_can_be_pickled(run: sprag.Study) -> None:
 
 def test_a_temporary_database_is_deleted_with_its_study() -> None:
     program = f"""
-import glob, sprag, tempfile
+import glob, tempfile, sprag_study as sprag
 study = sprag.run({_small()!r}, processes=0)
 (folder,) = glob.glob(tempfile.gettempdir() + "/sprag-run-*")
 with sprag.run({_small()!r}, processes=0) as other: pass
