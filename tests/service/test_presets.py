@@ -50,24 +50,37 @@ def test_machines_run(name: str) -> None:
     assert np.nanmax(results["balance.work"]) < 1e-9
 
 
-@pytest.mark.parametrize("name", MACHINES)
-def test_any_number_varies_alone_and_in_batches(name: str) -> None:
+def new_kinds(name: str, varied: set[str]) -> tuple[Study, list[str]]:
+    """A machine without axes, and its numbers of other kinds than ``varied``, which are added there.
+
+    Of equal parts, steps and the like it has the numbers of the last one.
+    """
     file, text = preset_text(name)
     spec: Any = load_spec(text, format_of(file))
     spec.pop("goal", None)
     base = parse_spec(spec | {"axes": []}).study
-    # Of equal parts, steps and the like the numbers of the last one.
     kinds = {re.sub(r"\.\d+(?=\.|$)", ".N", path): path for path in models.parameters_of(base)}
-    for path in kinds.values():
-        parameter = models.parameters_of(base)[path]
-        value = base.base.get(path, 0.5)
-        values = [v for v in (0.97 * value, 1.02 * value + 1e-3) if parameter.accepts(v)]
-        study = replace(base, axes=(Axis((path,), tuple(dict.fromkeys(values))),))
-        batch = models.run_chunk(study, 0, study.cases)
-        for case in range(study.cases):
-            alone = models.run_chunk(study, case, 1)
-            assert alone.endings == batch.endings[case : case + 1]
-            np.testing.assert_array_equal(alone.values[0], batch.values[case])
+    new = [path for kind, path in kinds.items() if kind not in varied]
+    varied |= set(kinds)
+    return base, new
+
+
+def test_any_number_varies_alone_and_in_batches() -> None:
+    """Each kind of number is varied in the first machine that has it."""
+    varied: set[str] = set()
+    for name in MACHINES:
+        base, paths = new_kinds(name, varied)
+        for path in paths:
+            parameter = models.parameters_of(base)[path]
+            value = base.base.get(path, 0.5)
+            values = [v for v in (0.97 * value, 1.02 * value + 1e-3) if parameter.accepts(v)]
+            study = replace(base, axes=(Axis((path,), tuple(dict.fromkeys(values))),))
+            batch = models.run_chunk(study, 0, study.cases)
+            for case in range(study.cases):
+                alone = models.run_chunk(study, case, 1)
+                assert alone.endings == batch.endings[case : case + 1], (name, path)
+                np.testing.assert_array_equal(alone.values[0], batch.values[case], err_msg=f"{name}: {path}")
+    assert len(varied) > 90
 
 
 def decreasing(values: NDArray[np.float64], axis: int) -> bool:

@@ -281,7 +281,7 @@ def test_a_worker_whose_kernel_gives_other_answers_is_refused(
 
 def edited_engine(folder: Path) -> dict[str, str]:
     """A copy of the sources whose engine is a hundred times less accurate, under the same version."""
-    for package in ("sprag", "engine", "worker"):
+    for package in ("sprag_study", "engine", "worker"):
         copied = {"symlinks": True, "ignore": shutil.ignore_patterns("__pycache__")}
         shutil.copytree(ROOT / package, folder / package, **copied)
     cases = folder / "engine" / "vibration_drive" / "cases.py"
@@ -291,13 +291,13 @@ def edited_engine(folder: Path) -> dict[str, str]:
 
 def no_sprag(folder: Path) -> dict[str, str]:
     """No package of Sprag that could be imported."""
-    (folder / "sprag.py").write_text("raise ImportError('there is no Sprag here')\n", encoding="utf-8")
+    (folder / "sprag_study.py").write_text("raise ImportError('there is no Sprag here')\n", encoding="utf-8")
     return {}
 
 
 def other_settings(folder: Path) -> dict[str, str]:
     """The same sources, compiled otherwise."""
-    (folder / "sprag").symlink_to(ROOT / "sprag")
+    (folder / "sprag_study").symlink_to(ROOT / "sprag_study")
     return {"NUMBA_OPT": "0"}
 
 

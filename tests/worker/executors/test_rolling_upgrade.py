@@ -44,10 +44,11 @@ class Upgrade:
         folder = self.folder / name
         if not folder.exists():
             folder.mkdir()
-            (folder / "sprag").symlink_to(ROOT / "sprag")
+            (folder / "sprag_study").symlink_to(ROOT / "sprag_study")
             if name == "new":
-                (folder / "sprag-9.9.9.dist-info").mkdir()
-                (folder / "sprag-9.9.9.dist-info" / "METADATA").write_text("Name: sprag\nVersion: 9.9.9\n")
+                about = folder / "sprag_study-9.9.9.dist-info"
+                about.mkdir()
+                (about / "METADATA").write_text("Name: sprag-study\nVersion: 9.9.9\n")
         return folder
 
     def start_host(self, host: str, version: str) -> None:
