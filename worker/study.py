@@ -17,7 +17,7 @@ from sprag_study.worker.directions import DOWN, SWEEP, UP
 from sprag_study.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES, MAX_COLUMNS
 from sprag_study.worker.models.formulas import evaluate
 from sprag_study.worker.packed import packed, unpacked
-from sprag_study.worker.spread import DRIVE, Spread
+from sprag_study.worker.spread import DRIVE, Spread, Tolerance
 
 __all__ = ["SAME_VALUE", "Axis", "Combine", "Study"]
 
@@ -113,6 +113,21 @@ class Study:
     def drives(self) -> int:
         """Number of drawn drives; 0 without tolerances."""
         return 0 if self.spread is None else self.spread.drives
+
+    @property
+    def tolerances(self) -> tuple[Tolerance, ...]:
+        """How its drives differ from the nominal one; none without a spread."""
+        return () if self.spread is None else self.spread.tolerances
+
+    @property
+    def kind(self) -> str | None:
+        """By which planner it chooses its own cases (`sprag_study.worker.planning`); None where its axes are given."""
+        return None if self.plan is None else str(self.plan["kind"])
+
+    @property
+    def batched(self) -> bool:
+        """Whether every place of its axes has a case of each drive."""
+        return self.spread is not None and self.plan is None
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from sprag_study.sentences import Place
 from sprag_study.service.exports.inputs import Input
@@ -41,8 +41,6 @@ if TYPE_CHECKING:
     from sprag_study.service.report.office import Office
     from sprag_study.service.results.key_answers import Found
 
-Write = Callable[["Report"], Iterator[Block]]
-
 #: Digits of inputs.
 _DIGITS: Final = 8
 #: How the path of a formula begins among what was given.
@@ -55,28 +53,7 @@ _ORIGINS: Final = {
 
 def chapters_of(report: Report) -> dict[str, str]:
     """The chapters that the study has, and their titles, in their order."""
-    study, plan = report.study, report.study.plan
-    varying = len(varying_axes(study))
-    without: set[str] = set()
-    if not report.warnings:
-        without.add("warnings")
-    if not varying:
-        without |= {"curves", "results", "axes"}
-    if plan is not None or varying < 2:
-        without.add("sensitivity")
-    if study.spread is None or plan is not None:
-        without.add("drives")
-    if plan is None or plan.get("kind") != CALIBRATE:
-        without.add("calibration")
-    if plan is not None and report.answers is None and map_plan(study) is None:
-        without |= {"curves", "results"}
-    if report.answers is None:
-        without.add("answers")
-    if not models.has_clutches(study):
-        without.add("clutch")
-    if len(drawings(study)) < 2:
-        without.add("drawings")
-    return {name: _(_TITLES[name]) for name in CHAPTERS if name not in without}
+    return {name: _(_CHAPTERS[name].title) for name in CHAPTERS if _CHAPTERS[name].has(report)}
 
 
 def appendix(report: Report, office: Office) -> Iterator[Section]:
@@ -84,7 +61,7 @@ def appendix(report: Report, office: Office) -> Iterator[Section]:
     names = report.question.appendix or ()
     for name, title in chapters_of(report).items():
         if name in names or "all" in names:
-            blocks = tuple(_facts(report, office) if name == "versions" else _WRITERS[name](report))
+            blocks = tuple(_CHAPTERS[name].blocks(report, office))
             if blocks:
                 yield Section(title, blocks)
 
@@ -297,39 +274,47 @@ def _facts(report: Report, office: Office) -> Iterator[Block]:
     yield Table(("", ""), tuple(facts))
 
 
+def _varies(report: Report) -> bool:
+    return bool(varying_axes(report.study))
+
+
+def _drawn(report: Report) -> bool:
+    """Whether the cases lie on curves or maps."""
+    plain = report.study.plan is None or report.answers is not None or map_plan(report.study) is not None
+    return _varies(report) and plain
+
+
+class _Chapter(NamedTuple):
+    """A chapter: its title, what it has, and whether a study has it."""
+
+    title: str
+    write: Callable[..., Iterator[Block]]
+    has: Callable[[Report], object] = lambda _report: True
+
+    def blocks(self, report: Report, office: Office) -> Iterator[Block]:
+        """What it has; the one about the computation is in the time of an office."""
+        return self.write(report, office) if self.write is _facts else self.write(report)
+
+
 #: The further figures stand by themselves: they are chosen one by one.
-_TITLES: Final[dict[str, str]] = {
-    "warnings": N_("Warnings"),
-    "answers": N_("Answers"),
-    "axes": N_("What varies"),
-    "curves": N_("Curves"),
-    "drawings": N_("Drawings"),
-    "clutch": N_("Clutch"),
-    "sensitivity": N_("Sensitivity"),
-    "calibration": N_("Calibration"),
-    "drives": N_("Drives"),
-    "endings": N_("How the cases ended"),
-    "ranges": N_("Ranges of the results"),
-    "inputs": N_("Inputs"),
-    "given": N_("Machine and run as given"),
-    "versions": N_("Study and versions"),
-    "results": N_("Curves of further results"),
-}
-_WRITERS: Final[dict[str, Write]] = {
-    "warnings": _warnings,
-    "answers": _answers,
-    "axes": _axes,
-    "curves": _curves,
-    "drawings": drawing_images,
-    "clutch": _clutch,
-    "sensitivity": _sensitivity,
-    "calibration": partial(_part, name="calibration"),
-    "drives": partial(_part, name="drives"),
-    "endings": _endings,
-    "ranges": _ranges,
-    "inputs": _inputs,
-    "given": _given,
-    "results": _further,
+_CHAPTERS: Final = {
+    "warnings": _Chapter(N_("Warnings"), _warnings, lambda report: report.warnings),
+    "answers": _Chapter(N_("Answers"), _answers, lambda report: report.answers is not None),
+    "axes": _Chapter(N_("What varies"), _axes, _varies),
+    "curves": _Chapter(N_("Curves"), _curves, _drawn),
+    "drawings": _Chapter(N_("Drawings"), drawing_images, lambda report: len(drawings(report.study)) > 1),
+    "clutch": _Chapter(N_("Clutch"), _clutch, lambda report: models.has_clutches(report.study)),
+    "sensitivity": _Chapter(N_("Sensitivity"), _sensitivity, lambda report: report.compares),
+    "calibration": _Chapter(
+        N_("Calibration"), partial(_part, name="calibration"), lambda report: report.study.kind == CALIBRATE
+    ),
+    "drives": _Chapter(N_("Drives"), partial(_part, name="drives"), lambda report: report.study.batched),
+    "endings": _Chapter(N_("How the cases ended"), _endings),
+    "ranges": _Chapter(N_("Ranges of the results"), _ranges),
+    "inputs": _Chapter(N_("Inputs"), _inputs),
+    "given": _Chapter(N_("Machine and run as given"), _given),
+    "versions": _Chapter(N_("Study and versions"), _facts),
+    "results": _Chapter(N_("Curves of further results"), _further, _drawn),
 }
 
 

@@ -91,7 +91,8 @@ class Report:
         store.digests.require_undamaged(study_id, anew=True)
         self.library, self.study_id, self.choice, self.question = library, study_id, choice, question
         self.record, self.progress = store.studies.look(study_id)
-        self.spec, self.study = store.studies.spec(study_id), store.studies.study(study_id)
+        self.spec = store.studies.spec(study_id)
+        self.study: Study = store.studies.study(study_id)
         self.infos = models.study_results(self.study)
         self.reading: Reading = reading_for(self.study, self.spec, choice)
         self.fetch: Fetch = partial(store.rows.for_cases, study_id)
@@ -136,9 +137,8 @@ class Report:
 
     def _place_of_batch(self, query: CurveQuery | None) -> str | None:
         """The value of the axis at which the answer of a batch holds, which has a case of every drive."""
-        batch = self.study.spread is not None and self.study.plan is None and self.chosen is None
         at = self.headline.at
-        if not batch or query is None or at is None or at[0] != query.x:
+        if not self.study.batched or self.chosen is not None or query is None or at is None or at[0] != query.x:
             return None
         unit = unit_of(self.study, query.x)
         return f"{at[1]!r} {'' if unit == '1' else unit}"
@@ -157,10 +157,15 @@ class Report:
         """The answer in a sentence or two, and its numbers."""
         return headline_of(self.library, self.study_id, self.chosen, self.question.point, self.question.curve)
 
+    @property
+    def compares(self) -> bool:
+        """Whether it can be told which of several parameters matters most."""
+        return self.study.plan is None and len(varying_axes(self.study)) > 1
+
     @cached_property
     def effects(self) -> tuple[Sensitivity, ...]:
         """What the main results depend on; none where a single axis varies, which is all of it."""
-        if len(varying_axes(self.study)) < 2 or self.study.plan is not None:
+        if not self.compares:
             return ()
         try:
             found = sensitivity(self.study, self.spec, drawn_results(self.study)[:MOST_RESULTS], self.fetch)
@@ -193,8 +198,7 @@ class Report:
     @cached_property
     def designs(self) -> Designs | None:
         """The designs of a search, ranked; None for another study."""
-        searches = self.study.plan is not None and self.study.plan.get("kind") == GOAL
-        return self.library.fronts.of(self.study_id, exact=False) if searches else None
+        return self.library.fronts.of(self.study_id, exact=False) if self.study.kind == GOAL else None
 
     @cached_property
     def best(self) -> list[int]:
@@ -214,8 +218,7 @@ class Report:
     @cached_property
     def calibrated(self) -> Calibration | None:
         """The calibration as far as it has come; None for another study."""
-        calibrates = self.study.plan is not None and self.study.plan.get("kind") == CALIBRATE
-        return self.library.calibrations.of(self.study_id) if calibrates else None
+        return self.library.calibrations.of(self.study_id) if self.study.kind == CALIBRATE else None
 
     @cached_property
     def calibration(self) -> DrivesPart | None:

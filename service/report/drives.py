@@ -37,7 +37,7 @@ class DrivesPart:
 
 def drives_part(study: Study, fetch: Fetch) -> DrivesPart | None:
     """The part about the drives; None for a study without tolerances, or one that chooses its own cases."""
-    if study.spread is None or study.plan is not None:
+    if not study.batched:
         return None
     names = drawn_results(study)
     try:

@@ -80,7 +80,7 @@ class Calibration:
 
 def plan_of(study: Study) -> CalibratePlan:
     """The calibration of a study; FaultError for a study without one."""
-    if study.plan is None or study.plan.get("kind") != CALIBRATE:
+    if study.plan is None or study.kind != CALIBRATE:
         message = N_("the study is not a calibration")
         fault = Fault(None, "conflict", message, allowed="a study whose spec has `calibrate`")
         raise FaultError("invalid-selection", message, [fault])

@@ -16,8 +16,15 @@ from sprag_study.service.reading.reader import Phrase, joined, model_title, plur
 from sprag_study.service.reading.wording import number, typed_text, unit_text
 from sprag_study.service.results.asked import goals_of, limits_of
 from sprag_study.service.results.calibration import plan_of
+from sprag_study.service.results.selection import tolerance_of
 from sprag_study.service.results.shown_inputs import choice_name, in_words, run_settings
-from sprag_study.service.results.varied import formula_text, in_captions, names_in_files, varied, with_distribution
+from sprag_study.service.results.varied import (
+    formula_text,
+    in_captions,
+    names_in_files,
+    varied,
+    with_distribution,
+)
 from sprag_study.service.spec.described import Described
 from sprag_study.service.spec.kinds.calibrate import CALIBRATE as CALIBRATION
 from sprag_study.service.spec.kinds.goal import GOAL as SEARCH
@@ -155,12 +162,11 @@ def _machine(one: ReadStudy) -> Iterator[tuple[str, _Cell]]:
 
 def _toleranced(one: ReadStudy, path: str, cell: _Cell, text: Text) -> _Cell:
     """The input with the tolerance of its parameter, if it has one."""
-    tolerances = () if one.study.spread is None else one.study.spread.tolerances
-    about = next((own.about for own in tolerances if path in own.paths), None)
-    if about is None:
+    tolerance = tolerance_of(one.study, path)
+    if tolerance is None:
         return cell
     said = _said(with_distribution(one.study, path, text), one.reading)
-    return replace(cell, value=(cell.value, repr(about)), text=said, full="")
+    return replace(cell, value=(cell.value, repr(tolerance.about)), text=said, full="")
 
 
 def _said(text: Text, reading: Reading) -> str:
@@ -189,8 +195,8 @@ def _text(item: Input, reading: Reading) -> str:
 
 def _asked(one: ReadStudy) -> Iterator[tuple[str, _Cell]]:
     """What is searched, refined or calibrated."""
-    study, reading, plan = one.study, one.reading, one.study.plan or {}
-    if plan.get("kind") == GOAL:
+    study, reading = one.study, one.reading
+    if study.kind == GOAL:
         texts = {
             "goal.best": (N_("Goals"), goals_of(study)),
             "goal.subject_to": (N_("Limits"), limits_of(study)),
@@ -199,12 +205,12 @@ def _asked(one: ReadStudy) -> Iterator[tuple[str, _Cell]]:
             if said:
                 text = reading.say(joined("; ", said))
                 yield path, _Cell(_(caption), text, text)
-    elif plan.get("kind") == REFINE:
-        refined = RefinePlan.from_json(plan)
+    elif study.kind == REFINE:
+        refined = RefinePlan.from_json(study.plan or {})
         text = ", ".join(map(reading.caption, refined.results))
         yield "refine.results", _Cell(_("Refined results"), text, text)
         yield "refine.error", _Cell(_("Largest error"), refined.error, f"{number(100.0 * refined.error, 4)} %")
-    elif plan.get("kind") == CALIBRATE:
+    elif study.kind == CALIBRATE:
         values = sum(len(own.values) for own in plan_of(study).measured)
         csv = one.spec["calibrate"]["measured"]["csv"]
         yield "calibrate.measured", _Cell(_("Measured values"), csv, number(values))

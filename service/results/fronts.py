@@ -96,7 +96,7 @@ class Designs:
 
 def goal_units(study: Study) -> tuple[str, ...]:
     """The units of the goals of a search, in their order; none of any other study."""
-    if study.plan is None or study.plan["kind"] != GOAL:
+    if study.kind != GOAL:
         return ()
     plan = goal_of(study)
     infos = infos_of(study, plan)
@@ -105,7 +105,7 @@ def goal_units(study: Study) -> tuple[str, ...]:
 
 def goal_of(study: Study) -> GoalPlan:
     """The search of a study; FaultError for a study without a goal."""
-    if study.plan is None or study.plan.get("kind") != GOAL:
+    if study.plan is None or study.kind != GOAL:
         message = N_("the study has no goal, so that its cases are no designs")
         raise FaultError(
             "invalid-selection", message, [Fault(None, "conflict", message, allowed="a study whose spec has `goal`")]

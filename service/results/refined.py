@@ -82,7 +82,7 @@ def curve_plan(study: Study) -> RefinePlan | None:
 
 def refine_plan(study: Study, adaptive: int) -> RefinePlan | None:
     """The plan of a study that refines along so many axes; None for any other."""
-    if study.plan is None or study.plan["kind"] != REFINE:
+    if study.plan is None or study.kind != REFINE:
         return None
     plan = RefinePlan.from_json(study.plan)
     return plan if len(plan.adaptive) == adaptive else None

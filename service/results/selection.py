@@ -25,6 +25,7 @@ from sprag_study.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
     from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.spread import Tolerance
     from sprag_study.worker.study import Study
 
 #: Fixed axes: position of the axis -> (the path that named it, position of the value on it).
@@ -122,12 +123,17 @@ def held_text(study: Study, path: str, value: float, *, every: bool = False) -> 
     return Phrase("{name} = {value}", name=Name(axis_name(study, path)), value=said)
 
 
+def tolerance_of(study: Study, path: str) -> Tolerance | None:
+    """The tolerance of a parameter; None where it has none."""
+    return next((one for one in study.tolerances if path in one.paths), None)
+
+
 def with_tolerance(study: Study, path: str, value: str | Amount) -> str | Amount:
     """A value with the tolerance of its parameter as it was written: ``0.2 mm ± 60 %``; the value without one."""
-    for one in () if study.spread is None else study.spread.tolerances:
-        if path in one.paths and "plus_minus" in one.about:
-            return Phrase("{value} ± {tolerance}", value=value, tolerance=typed_text(str(one.about["plus_minus"])))
-    return value
+    one = tolerance_of(study, path)
+    if one is None or "plus_minus" not in one.about:
+        return value
+    return Phrase("{value} ± {tolerance}", value=value, tolerance=typed_text(str(one.about["plus_minus"])))
 
 
 def held_texts(study: Study, at: Mapping[str, float]) -> tuple[Phrase, ...]:

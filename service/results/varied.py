@@ -14,7 +14,7 @@ from sprag_study.service.reading.reader import CODES, Phrase, joined, plural, te
 from sprag_study.service.reading.wording import number, typed_text, unit_text
 from sprag_study.service.results.calibration import plan_of
 from sprag_study.service.results.fronts import goal_of
-from sprag_study.service.results.selection import with_tolerance
+from sprag_study.service.results.selection import tolerance_of, with_tolerance
 from sprag_study.worker.models import NO_PARAMETERS
 from sprag_study.worker.planning.calibrate.plan import CALIBRATE
 from sprag_study.worker.planning.goals.plan import GOAL
@@ -98,8 +98,7 @@ def listed(values: Sequence[float], unit: str, digits: int = _DIGITS) -> Text:
 
 
 def _searched(study: Study) -> tuple[Variable | Unknown, ...]:
-    kind = None if study.plan is None else study.plan.get("kind")
-    return goal_of(study).vary if kind == GOAL else plan_of(study).unknown if kind == CALIBRATE else ()
+    return goal_of(study).vary if study.kind == GOAL else plan_of(study).unknown if study.kind == CALIBRATE else ()
 
 
 def ends(low: float, high: float, unit: str, digits: int = _DIGITS) -> Text:
@@ -111,15 +110,13 @@ def ends(low: float, high: float, unit: str, digits: int = _DIGITS) -> Text:
 
 def with_distribution(study: Study, path: str, value: Text) -> Text:
     """The same with the distribution of the parameter: ``0.2 mm ± 60 %, normal``."""
-    for one in () if study.spread is None else study.spread.tolerances:
-        if path in one.paths:
-            return joined(", ", (with_tolerance(study, path, value), *_distribution(one.about)))
-    return value
+    one = tolerance_of(study, path)
+    return value if one is None else joined(", ", (with_tolerance(study, path, value), *_distribution(one.about)))
 
 
 def tolerances_of(study: Study) -> Iterator[tuple[tuple[str, ...], Phrase]]:
     """The parameters of each tolerance, and how they differ from drive to drive: ``± 60 %, normal``."""
-    for one in () if study.spread is None else study.spread.tolerances:
+    for one in study.tolerances:
         width = one.about.get("plus_minus")
         parts = [] if width is None else [Phrase("± {tolerance}", tolerance=typed_text(str(width)))]
         yield one.paths, joined(", ", (*parts, *_distribution(one.about)))

@@ -58,6 +58,9 @@ def whole_columns(library: Library, study_id: str, names: Sequence[str]) -> Case
     return CaseColumns(rows.cases, [ending for ending, _ in kinds], rows.values, [flags for _, flags in kinds])
 
 
+KeyAnswer = StudyAnswer[AnswersChoice, StudyAnswers]
+
+
 class AnswersView(StudyView[AnswersQuestion, AnswersChoice, StudyAnswers]):
     """No-load speed, largest power, best efficiency, stall torque, a working point."""
 
@@ -85,23 +88,21 @@ class AnswersView(StudyView[AnswersQuestion, AnswersChoice, StudyAnswers]):
         """The answers."""
         return answers_of(library, study_id, chosen.query, chosen.point)
 
-    def json(self, answer: StudyAnswer[AnswersChoice, StudyAnswers]) -> m.AnswerReport:
+    def json(self, answer: KeyAnswer) -> m.AnswerReport:
         """The answers as JSON data."""
         return report(answer.study_id, answer.study, answer.result)
 
-    def csv(self, answer: StudyAnswer[AnswersChoice, StudyAnswers], reading: Reading) -> bytes:
+    def csv(self, answer: KeyAnswer, reading: Reading) -> bytes:
         """A row for each answer."""
         return answers_csv(answer.study, answer.result, reading)
 
-    def figure(self, answer: StudyAnswer[AnswersChoice, StudyAnswers], columns: int = 2) -> Figure | None:
+    def figure(self, answer: KeyAnswer, columns: int = 2) -> Figure | None:
         """The curves of the main results with their answers marked; None where the cases lie on no curve."""
         if answer.result.drawn is None:
             return None
         return answers_figure(answer.result, columns)
 
-    def picture(
-        self, answer: StudyAnswer[AnswersChoice, StudyAnswers], reading: Reading, title: str, form: Picture
-    ) -> bytes:
+    def picture(self, answer: KeyAnswer, reading: Reading, title: str, form: Picture) -> bytes:
         """Where there is a curve, and not too many."""
         if answer.result.drawn is None:
             raise refused("format", "not-used", "there is no curve to draw", form, allowed="json or csv")

@@ -86,15 +86,15 @@ def usual_ends(study: Study) -> dict[str, tuple[str, str]]:
     }
 
 
-def require_basin(study: Study) -> None:
-    """Raise FaultError where cases of a study have no basins."""
-    if not (models.is_settled(study.run) and initial_values(study)):
-        raise FaultError("not-found", "Only cases that run until their motion is settled have basins.")
+def has_basin(study: Study) -> bool:
+    """Whether cases settle, and have initial values."""
+    return models.is_settled(study.run) and bool(initial_values(study))
 
 
 def basin_paths(study: Study, x: str | None, y: str | None) -> tuple[str, str]:
     """The two initial values, by default the first ones of the study's starts; FaultError about a parameter."""
-    require_basin(study)
+    if not has_basin(study):
+        raise FaultError("not-found", "Only cases that run until their motion is settled have basins.")
     known = initial_values(study)
     ranges = study.run[STARTS]["ranges"] if has_starts(study.run) else {}
     usual = [path for path in (*ranges, *known) if path in known]
@@ -169,10 +169,7 @@ def basin_json(study: Study, query: BasinQuery, made: Basin) -> BasinData:
     }
 
 
-def units_of(study: Study, query: BasinQuery) -> tuple[str, str]:
-    """Units of both initial values."""
-    known = initial_values(study)
-    return known[query.paths[0]].unit, known[query.paths[1]].unit
+BasinAnswer = CaseAnswer[BasinQuery, Basin]
 
 
 class BasinView(CaseView[BasinQuestion, BasinQuery, Basin]):
@@ -192,11 +189,11 @@ class BasinView(CaseView[BasinQuestion, BasinQuery, Basin]):
         """Run the case from every start."""
         return models.run_basin(study, case, chosen.paths, *chosen.axes())
 
-    def json(self, answer: CaseAnswer[BasinQuery, Basin]) -> BasinData:
+    def json(self, answer: BasinAnswer) -> BasinData:
         """The grid as JSON data."""
         return basin_json(answer.study, answer.chosen, answer.result)
 
-    def csv(self, answer: CaseAnswer[BasinQuery, Basin]) -> bytes:
+    def csv(self, answer: BasinAnswer) -> bytes:
         """A row for each start: both initial values, the number of the regime, and its mean speed."""
         across, along = np.meshgrid(answer.result.x, answer.result.y)
         members, speeds = answer.result.members.reshape(-1), answer.result.values[:, answer.result.names.index(_SPEED)]
@@ -208,13 +205,14 @@ class BasinView(CaseView[BasinQuestion, BasinQuery, Basin]):
         ]
         return table_csv([*answer.chosen.paths, "regime.number", _SPEED], columns)
 
-    def figure(self, answer: CaseAnswer[BasinQuery, Basin], columns: int = 2, rows: Any = None) -> Figure:
+    def figure(self, answer: BasinAnswer, columns: int = 2) -> Figure:
         """Points in the plane of both initial values, a colour for each regime."""
-        return basin_figure(answer.result, answer.chosen.paths, units_of(answer.study, answer.chosen))
+        known, (x, y) = initial_values(answer.study), answer.chosen.paths
+        return basin_figure(answer.result, (x, y), (known[x].unit, known[y].unit))
 
     def has(self, study: Study) -> bool:
         """Whether cases settle, and have initial values."""
-        return models.is_settled(study.run) and bool(initial_values(study))
+        return has_basin(study)
 
     def offered(self, study: Study, case: int) -> dict[str, Offered]:
         """The initial values; ranges as in the study's starts, otherwise none."""
@@ -226,7 +224,7 @@ class BasinView(CaseView[BasinQuestion, BasinQuery, Basin]):
             found |= {f"{name}_{end}": Offered(hint=hint) for end, hint in zip(("from", "to"), hints, strict=True)}
         return found
 
-    def shown(self, answer: CaseAnswer[BasinQuery, Basin]) -> Shown:
+    def shown(self, answer: BasinAnswer) -> Shown:
         """The regimes to which the starts come."""
         rows = [
             [

@@ -97,7 +97,7 @@ def _causes_table(study: Study, causes: Causes, title: Phrase, good: YieldLine |
     With a yield that is neither all nor none, also that of the drives that are nearest to nominal in each tolerance,
     and how near they have to be for the wanted one.
     """
-    tolerances = () if study.spread is None else study.spread.tolerances
+    tolerances = study.tolerances
     columns = [Column(Phrase("Tolerance")), Column(Phrase("Share"), "%", 3), Column(Phrase("±"), "%", 2)]
     further: list[list[Cell]] = [[] for _ in tolerances]
     if good is not None and 0.0 < float(good.whole.value) < 1.0:
@@ -167,7 +167,7 @@ def _worst_table(found: Yield, one: YieldLine, causes: Causes) -> ShownTable:
     one in which the fewest drives are farther from nominal.
     """
     study, x = found.places.study, found.places.x
-    tolerances = () if study.spread is None else study.spread.tolerances
+    tolerances = study.tolerances
     apart = deviations(study)
     size = np.abs(apart)
     shares = np.array([0.0 if share is None else max(share.value, 0.0) for share in causes.shares])
@@ -209,7 +209,7 @@ def _drawn(own: Tolerance, draws: Mapping[str, float]) -> float:
 def _draws_table(found: Yield, one: YieldLine) -> ShownTable:
     """The worst drives of a line with their margins and draws."""
     study, x = found.places.study, found.places.x
-    spread = () if study.spread is None else study.spread.tolerances
+    spread = study.tolerances
     columns = [
         *_worst_columns(found, x), Column(Phrase("Margin"), "%", 3),
         *(Column(own.name, "%" if own.change == "scale" else unit_of(study, own.paths[0]), 3) for own in spread),

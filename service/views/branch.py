@@ -16,13 +16,12 @@ from sprag_study.service.figures.branch import OwnCases, branch_figure, special_
 from sprag_study.service.json_text import numbers
 from sprag_study.service.languages import N_, _
 from sprag_study.service.reading.catalogue import unit_of
-from sprag_study.service.reading.directions import case_values
 from sprag_study.service.reading.reader import Phrase, plural
 from sprag_study.service.reading.units import QuantityError, typed_value
 from sprag_study.service.results.selection import axis_name, ends_of_range
 from sprag_study.service.views.case_questions import BRANCH, BranchQuestion
 from sprag_study.service.views.case_view import CaseAnswer, CaseView, Said
-from sprag_study.service.views.portrait import require_strobes
+from sprag_study.service.views.portrait import Strobed, require_strobes
 from sprag_study.service.views.setting import Offered
 from sprag_study.service.views.shown import Shown
 from sprag_study.worker import models
@@ -186,49 +185,6 @@ def _value_in(unit: str) -> Sentence:
     return Sentence("a value in {unit}", unit=Typed(unit))
 
 
-def branch_json(made: CaseBranch, study: Study, case: int, along: Along) -> Branch:
-    """The branch as JSON data."""
-    return {
-        "case": case,
-        "parameters": case_values(study, case),
-        "along": list(along.paths),
-        "unit": unit_of(study, along.paths[0]),
-        "low": along.low,
-        "high": along.high,
-        "value": made.value,
-        "order": made.order or None,
-        "parameter": made.parameters.tolist(),
-        "stable": made.stable.tolist(),
-        "multiplier": made.multipliers.tolist(),
-        "variables": {name: {"unit": unit} for name, unit in zip(made.names, made.units, strict=True)},
-        "values": {name: numbers(made.values[:, column]) for column, name in enumerate(made.names)},
-        "specials": [
-            {
-                "kind": special.kind,
-                "meaning": special.meaning,
-                "parameter": special.parameter,
-                "index": special.index,
-                "multipliers": [[value.real, value.imag] for value in special.multipliers],
-                "contacts": [filled(BranchContact, contact) for contact in special.contacts],
-            }
-            for special in made.specials
-        ],
-        "ends": list(made.ends) if made.order else [],
-        "note": made.note or None,
-    }
-
-
-def branch_csv(made: CaseBranch, along: Along) -> bytes:
-    """The points as CSV: the parameter, whether the motion is stable, its multiplier, what is special, the results."""
-    kinds = [""] * len(made.parameters)
-    for special in made.specials:
-        kinds[special.index] = special.kind
-    stable = ["true" if stable else "false" for stable in made.stable.tolist()]
-    header = [along.paths[0], "stable", "multiplier", "special", *made.names]
-    results = (made.values[:, column].tolist() for column in range(len(made.names)))
-    return table_csv(header, [made.parameters.tolist(), stable, made.multipliers.tolist(), kinds, *results])
-
-
 def neighbours(study: Study, case: int, along: Along) -> NDArray[np.int64]:
     """The cases of a grid that differ from one only in the parameter of a branch, or in the direction of a sweep.
 
@@ -247,13 +203,15 @@ def neighbours(study: Study, case: int, along: Along) -> NDArray[np.int64]:
     )
 
 
-class BranchView(CaseView[BranchQuestion, tuple[Along, str], CaseBranch]):
+BranchAnswer = CaseAnswer[tuple[Along, str], CaseBranch]
+
+
+class BranchView(Strobed, CaseView[BranchQuestion, tuple[Along, str], CaseBranch]):
     """The periodic motions that the motion of a case becomes along a parameter."""
 
     about = BRANCH
     content = "The branch as JSON, its points as CSV, or a picture."
     shape = Branch
-    lacks = N_("has no motion that settles")
 
     def choose(self, study: Study, case: int, question: BranchQuestion) -> tuple[Along, str]:
         """The parameter with its range, and the result of a picture."""
@@ -263,13 +221,49 @@ class BranchView(CaseView[BranchQuestion, tuple[Along, str], CaseBranch]):
         """Follow the branch."""
         return run_branch(study, case, chosen[0])
 
-    def json(self, answer: CaseAnswer[tuple[Along, str], CaseBranch]) -> Branch:
+    def json(self, answer: BranchAnswer) -> Branch:
         """The branch as JSON data."""
-        return branch_json(answer.result, answer.study, answer.case, answer.chosen[0])
+        made, (along, _result) = answer.result, answer.chosen
+        return {
+            "case": answer.case,
+            "parameters": answer.parameters,
+            "along": list(along.paths),
+            "unit": unit_of(answer.study, along.paths[0]),
+            "low": along.low,
+            "high": along.high,
+            "value": made.value,
+            "order": made.order or None,
+            "parameter": made.parameters.tolist(),
+            "stable": made.stable.tolist(),
+            "multiplier": made.multipliers.tolist(),
+            "variables": {name: {"unit": unit} for name, unit in zip(made.names, made.units, strict=True)},
+            "values": dict(zip(made.names, map(numbers, made.values.T), strict=True)),
+            "specials": [
+                {
+                    "kind": special.kind,
+                    "meaning": special.meaning,
+                    "parameter": special.parameter,
+                    "index": special.index,
+                    "multipliers": [[value.real, value.imag] for value in special.multipliers],
+                    "contacts": [filled(BranchContact, contact) for contact in special.contacts],
+                }
+                for special in made.specials
+            ],
+            "ends": list(made.ends) if made.order else [],
+            "note": made.note or None,
+        }
 
-    def csv(self, answer: CaseAnswer[tuple[Along, str], CaseBranch]) -> bytes:
-        """The points of the branch."""
-        return branch_csv(answer.result, answer.chosen[0])
+    def csv(self, answer: BranchAnswer) -> bytes:
+        """The points: the parameter, whether the motion is stable, its multiplier, what is special, the results."""
+        made = answer.result
+        kinds = [""] * len(made.parameters)
+        for special in made.specials:
+            kinds[special.index] = special.kind
+        stable = ["true" if stable else "false" for stable in made.stable.tolist()]
+        header = [answer.chosen[0].paths[0], "stable", "multiplier", "special", *made.names]
+        return table_csv(
+            header, [made.parameters.tolist(), stable, made.multipliers.tolist(), kinds, *made.values.T.tolist()]
+        )
 
     def rows(self, store: Store, study_id: str, study: Study, case: int, chosen: tuple[Along, str]) -> OwnCases:
         """The finished cases of the study that differ from this one in the parameter only."""
@@ -280,15 +274,9 @@ class BranchView(CaseView[BranchQuestion, tuple[Along, str], CaseBranch]):
         kept = np.isfinite(y)
         return OwnCases(x[kept], y[kept], cases[kept])
 
-    def figure(
-        self, answer: CaseAnswer[tuple[Along, str], CaseBranch], columns: int = 2, rows: OwnCases | None = None
-    ) -> Figure:
+    def figure(self, answer: BranchAnswer, columns: int = 2) -> Figure:
         """One result over the parameter, with the study's own cases beside it."""
-        return branch_figure(answer.result, answer.study, *answer.chosen, rows)
-
-    def has(self, study: Study) -> bool:
-        """Whether there are strobes."""
-        return models.has_strobes(study)
+        return branch_figure(answer.result, answer.study, *answer.chosen, answer.rows)
 
     def offered(self, study: Study, case: int) -> dict[str, Offered]:
         """The parameters, and the results of an orbit."""
@@ -298,7 +286,7 @@ class BranchView(CaseView[BranchQuestion, tuple[Along, str], CaseBranch]):
             "y": Offered((result_of(study, None),), groups=named(branch_results(study))),
         }
 
-    def shown(self, answer: CaseAnswer[tuple[Along, str], CaseBranch]) -> Shown:
+    def shown(self, answer: BranchAnswer) -> Shown:
         """How far the branch goes, and what is special on it; or why there is none."""
         made = answer.result
         if made.note:
@@ -312,7 +300,7 @@ class BranchView(CaseView[BranchQuestion, tuple[Along, str], CaseBranch]):
         unit = unit_of(answer.study, answer.chosen[0].paths[0])
         return Shown((sentence, *(special_text(special, unit) for special in made.specials)))
 
-    def said(self, answer: CaseAnswer[tuple[Along, str], CaseBranch]) -> Said:
+    def said(self, answer: BranchAnswer) -> Said:
         """How many orbits there are."""
         data = {"points": len(answer.result.parameters), "specials": len(answer.result.specials)}
         return Said(data, not answer.result.note)

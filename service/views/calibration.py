@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from sprag_study.worker.study import Study
 
 
+CalibrationAnswer = StudyAnswer[None, Calibration]
+
+
 class CalibrationView(StudyView[CalibrationQuestion, None, Calibration]):
     """Values with intervals, correlations, residuals, the next point to measure."""
 
@@ -41,15 +44,15 @@ class CalibrationView(StudyView[CalibrationQuestion, None, Calibration]):
         """The calibration."""
         return library.calibrations.of(study_id)
 
-    def json(self, answer: StudyAnswer[None, Calibration]) -> CalibrationReport:
+    def json(self, answer: CalibrationAnswer) -> CalibrationReport:
         """The calibration as JSON data."""
         return calibration_json(answer.study_id, answer.result)
 
-    def csv(self, answer: StudyAnswer[None, Calibration], reading: Reading) -> bytes:
+    def csv(self, answer: CalibrationAnswer, reading: Reading) -> bytes:
         """The measured points beside the fit."""
         return calibration_csv(answer.result, reading.units)
 
-    def figure(self, answer: StudyAnswer[None, Calibration], columns: int = 2) -> Figure:
+    def figure(self, answer: CalibrationAnswer, columns: int = 2) -> Figure:
         """The measured points on the fitted curves, and the residuals."""
         return calibration_figure(answer.result, columns)
 
@@ -57,7 +60,7 @@ class CalibrationView(StudyView[CalibrationQuestion, None, Calibration]):
         """Whether it is a calibration."""
         return asked_by(study) == "measured"
 
-    def shown(self, answer: StudyAnswer[None, Calibration]) -> Shown:
+    def shown(self, answer: CalibrationAnswer) -> Shown:
         """What else should be known before the values are used; values, correlations, measured points."""
         found = answer.result
         report = calibration_json(answer.study_id, found)

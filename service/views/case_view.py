@@ -15,12 +15,14 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, TypeVar
 from sprag_study.service.figures.pictures import draw_figure
 from sprag_study.service.figures.read import read_figure
 from sprag_study.service.json_text import to_bytes
+from sprag_study.service.reading.directions import case_values
 from sprag_study.service.reading.reader import Reading
 from sprag_study.service.views.shown import Shown
 from sprag_study.worker import models
 from sprag_study.worker.models.starts import motion_of
 
 if TYPE_CHECKING:
+    from sprag_study.service.answers import Value
     from sprag_study.service.figures.figure import Figure
     from sprag_study.service.figures.pictures import Picture
     from sprag_study.service.storage.store import Store
@@ -35,12 +37,21 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True, slots=True)
 class CaseAnswer(Generic[Chosen, Result]):
-    """A view of a case: of which study and case, what was chosen, and what was computed."""
+    """A view of a case: of which study and case, what was chosen, and what was computed.
+
+    ``rows`` are what its figure shows of the rows of the study, as `CaseView.rows` gives them.
+    """
 
     study: Study
     case: int
     chosen: Chosen
     result: Result
+    rows: Any = None
+
+    @property
+    def parameters(self) -> dict[str, Value]:
+        """The parameters of the case on axes and derived ones, SI."""
+        return case_values(self.study, self.case)
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +127,7 @@ class CaseView(ABC, Generic[Question, Chosen, Result]):
         """What its figure shows of the rows of the study; None: nothing, so that it never changes."""
         return None
 
-    def figure(self, answer: CaseAnswer[Chosen, Result], columns: int = 2, rows: Any = None) -> Figure:
+    def figure(self, answer: CaseAnswer[Chosen, Result], columns: int = 2) -> Figure:
         """The view as a described figure, with so many panels in a row."""
         raise NotImplementedError  # those without pictures
 

@@ -70,6 +70,10 @@ def _numbered(study: Study, query: CurveQuery, number: int) -> CurveQuery:
     return replace(query, number=number)
 
 
+CurvesAnswer = StudyAnswer[CurveQuery, Curves]
+MapAnswer = StudyAnswer[tuple[CurveQuery, bool], Map]
+
+
 class CurvesView(StudyView[CurvesQuestion, CurveQuery, Curves]):
     """Results against one axis."""
 
@@ -98,11 +102,11 @@ class CurvesView(StudyView[CurvesQuestion, CurveQuery, Curves]):
         """The curves; those that are drawn have the points of refined curves between their cases."""
         return (drawn_curves if drawn else stored_curves)(library.store, study_id, chosen)
 
-    def json(self, answer: StudyAnswer[CurveQuery, Curves]) -> dict[str, Any]:
+    def json(self, answer: CurvesAnswer) -> dict[str, Any]:
         """The curves as JSON data."""
         return {"study": answer.study_id, **answer.result.to_json()}
 
-    def csv(self, answer: StudyAnswer[CurveQuery, Curves], reading: Reading) -> bytes:
+    def csv(self, answer: CurvesAnswer, reading: Reading) -> bytes:
         """Every point of every curve as one row: fixed parameters, case, x, results, regime and its order, ending.
 
         Of refined curves also the results that are not interpolated up to the next point, of a sweep whether the motion
@@ -130,13 +134,11 @@ class CurvesView(StudyView[CurvesQuestion, CurveQuery, Curves]):
         units = {**curves.selection.units, **{info.name: info.unit for info in curves.selection.results}}
         return exports.read_table(columns, units, reading.units)
 
-    def figure(self, answer: StudyAnswer[CurveQuery, Curves], columns: int = 2) -> Figure:
+    def figure(self, answer: CurvesAnswer, columns: int = 2) -> Figure:
         """A panel for each result."""
         return curves_figure([("", answer.result)], columns)
 
-    def picture(
-        self, answer: StudyAnswer[CurveQuery, Curves], reading: Reading, title: str, form: pictures.Picture
-    ) -> bytes:
+    def picture(self, answer: CurvesAnswer, reading: Reading, title: str, form: pictures.Picture) -> bytes:
         """Not too many curves and points."""
         pictures.require_drawable([answer.result])
         return super().picture(answer, reading, title, form)
@@ -185,11 +187,11 @@ class MapView(StudyView[MapQuestion, tuple[CurveQuery, bool], Map]):
         """The map."""
         return stored_map(library.store, study_id, chosen[0])
 
-    def json(self, answer: StudyAnswer[tuple[CurveQuery, bool], Map]) -> dict[str, Any]:
+    def json(self, answer: MapAnswer) -> dict[str, Any]:
         """The map as JSON data."""
         return {"study": answer.study_id, **answer.result.to_json()}
 
-    def csv(self, answer: StudyAnswer[tuple[CurveQuery, bool], Map], reading: Reading) -> bytes:
+    def csv(self, answer: MapAnswer, reading: Reading) -> bytes:
         """Every point of the map as one row: fixed parameters, y, x, case, result, regime and its order, flags, ending.
 
         The squares of a refined map are no cases: they have neither regimes nor flags.
@@ -216,8 +218,6 @@ class MapView(StudyView[MapQuestion, tuple[CurveQuery, bool], Map]):
         units = {**drawn.at_units, drawn.x: x_unit, drawn.y: y_unit, result.name: result.unit}
         return exports.read_table(columns, units, reading.units)
 
-    def picture(
-        self, answer: StudyAnswer[tuple[CurveQuery, bool], Map], reading: Reading, title: str, form: pictures.Picture
-    ) -> bytes:
+    def picture(self, answer: MapAnswer, reading: Reading, title: str, form: pictures.Picture) -> bytes:
         """Colours, or lines of equal value."""
         return draw_map(read_map(answer.result, reading), title, form, contours=answer.chosen[1])

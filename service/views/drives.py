@@ -63,7 +63,7 @@ class _OfDrives:
 
     def has(self, study: Study) -> bool:
         """Whether drives were drawn."""
-        return study.spread is not None and study.plan is None
+        return study.batched
 
     def offered(self, study: Study) -> dict[str, Offered]:
         """The axes, the results, and what a good drive reaches first."""
@@ -77,6 +77,10 @@ class _OfDrives:
             "quantile": Offered(tuple(f"{100.0 * p:g} %" for p in QUANTILES)),
             "condition": Offered((first_condition(study, y),)),
         }
+
+
+RibbonAnswer = StudyAnswer[RibbonQuery, Ribbon]
+YieldAnswer = StudyAnswer[YieldQuery, Yield]
 
 
 class RibbonView(_OfDrives, StudyView[RibbonQuestion, RibbonQuery, Ribbon]):
@@ -110,19 +114,19 @@ class RibbonView(_OfDrives, StudyView[RibbonQuestion, RibbonQuery, Ribbon]):
         fetch = partial(library.store.rows.for_cases, study_id)
         return ribbon(study, chosen.y or drawn_results(study), chosen.asked, chosen.quantiles, fetch)
 
-    def json(self, answer: StudyAnswer[RibbonQuery, Ribbon]) -> m.RibbonReport:
+    def json(self, answer: RibbonAnswer) -> m.RibbonReport:
         """The ribbons as JSON data."""
         return ribbon_json(answer.study_id, answer.result)
 
-    def csv(self, answer: StudyAnswer[RibbonQuery, Ribbon], reading: Reading) -> bytes:
+    def csv(self, answer: RibbonAnswer, reading: Reading) -> bytes:
         """A row for each place and quantile."""
         return ribbon_csv(answer.result, reading.units)
 
-    def figure(self, answer: StudyAnswer[RibbonQuery, Ribbon], columns: int = 2) -> Figure:
+    def figure(self, answer: RibbonAnswer, columns: int = 2) -> Figure:
         """The quantiles over the places."""
         return ribbon_figure(answer.result)
 
-    def picture(self, answer: StudyAnswer[RibbonQuery, Ribbon], reading: Reading, title: str, form: Picture) -> bytes:
+    def picture(self, answer: RibbonAnswer, reading: Reading, title: str, form: Picture) -> bytes:
         """The ribbons, or a map of the first quantile."""
         if not answer.chosen.mapped:
             return super().picture(answer, reading, title, form)
@@ -156,19 +160,19 @@ class YieldView(_OfDrives, StudyView[YieldQuestion, YieldQuery, Yield]):
         fetch = partial(library.store.rows.for_cases, study_id)
         return yields(study, chosen.conditions, chosen.asked, chosen.worst, fetch)
 
-    def json(self, answer: StudyAnswer[YieldQuery, Yield]) -> m.YieldReport:
+    def json(self, answer: YieldAnswer) -> m.YieldReport:
         """The yields as JSON data."""
         return yield_json(answer.study_id, answer.result)
 
-    def csv(self, answer: StudyAnswer[YieldQuery, Yield], reading: Reading) -> bytes:
+    def csv(self, answer: YieldAnswer, reading: Reading) -> bytes:
         """A row for each place."""
         return yield_csv(answer.result, reading.units)
 
-    def figure(self, answer: StudyAnswer[YieldQuery, Yield], columns: int = 2) -> Figure:
+    def figure(self, answer: YieldAnswer, columns: int = 2) -> Figure:
         """The yield over the places."""
         return yield_figure(answer.result)
 
-    def picture(self, answer: StudyAnswer[YieldQuery, Yield], reading: Reading, title: str, form: Picture) -> bytes:
+    def picture(self, answer: YieldAnswer, reading: Reading, title: str, form: Picture) -> bytes:
         """The yields over the places, or as a map."""
         if not answer.chosen.mapped:
             return super().picture(answer, reading, title, form)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Final
 
 from sprag_study.sentences import Amount
@@ -11,7 +10,6 @@ from sprag_study.service.answers.results import EngagementRow, EngagementTables,
 from sprag_study.service.exports import table_csv
 from sprag_study.service.faults import FaultError, choice_of
 from sprag_study.service.languages import N_, _
-from sprag_study.service.reading.directions import case_values
 from sprag_study.service.reading.reader import Phrase, joined, plural
 from sprag_study.service.views.case_questions import ENGAGEMENTS, EngagementsQuestion
 from sprag_study.service.views.case_view import CaseAnswer, CaseView, Said
@@ -20,7 +18,6 @@ from sprag_study.worker import models
 from sprag_study.worker.models import Engagements
 
 if TYPE_CHECKING:
-    from sprag_study.service.answers import Value
     from sprag_study.service.views.shown import Cell
     from sprag_study.worker.models import Engagement
     from sprag_study.worker.study import Study
@@ -42,35 +39,11 @@ COLUMNS: Final[dict[str, dict[str, str]]] = {
 }  # fmt: skip
 
 
-def require_clutches(study: Study) -> None:
-    """Raise FaultError where the study's machine has no clutches."""
-    if not models.has_clutches(study):
-        raise FaultError("not-found", f"A machine of model {study.model} has no clutches, so it has no engagements.")
-
-
-def engagements_json(made: Engagements, case: int, parameters: dict[str, Value]) -> EngagementTables:
-    """Both tables as JSON data; ``parameters`` are the axis parameters of the case, SI."""
-    return {
-        "case": case,
-        "parameters": parameters,
-        "start": made.start,
-        "end": made.end,
-        "regime": made.regime or None,
-        "engagements": [filled(EngagementRow, row) for row in made.rows],
-        "periods": [filled(PeriodRow, row) for row in made.periods],
-        "ending": made.ending,
-    }
-
-
-def engagements_csv(made: Engagements, table: str) -> bytes:
-    """One of the tables as CSV."""
-    rows = [asdict(row) for row in (made.rows if table == "engagements" else made.periods)]
-    columns = COLUMNS[table]
-    return table_csv(list(columns), [[_cell(row[name]) for row in rows] for name in columns])
-
-
 def _cell(value: object) -> object:
     return str(value).lower() if isinstance(value, bool) else value
+
+
+EngagementsAnswer = CaseAnswer[str, Engagements]
 
 
 class EngagementsView(CaseView[EngagementsQuestion, str, Engagements]):
@@ -83,26 +56,33 @@ class EngagementsView(CaseView[EngagementsQuestion, str, Engagements]):
 
     def choose(self, study: Study, case: int, question: EngagementsQuestion) -> str:
         """The table of a CSV file."""
-        require_clutches(study)
+        if not self.has(study):
+            message = f"A machine of model {study.model} has no clutches, so it has no engagements."
+            raise FaultError("not-found", message)
         return choice_of("table", question.table, COLUMNS)
 
     def compute(self, study: Study, case: int, chosen: str) -> Engagements:
         """Run the case."""
         return models.run_engagements(study, case)
 
-    def json(self, answer: CaseAnswer[str, Engagements]) -> EngagementTables:
+    def json(self, answer: EngagementsAnswer) -> EngagementTables:
         """Both tables as JSON data."""
-        return engagements_json(answer.result, answer.case, case_values(answer.study, answer.case))
+        given = {"case": answer.case, "parameters": answer.parameters, "regime": answer.result.regime or None}
+        rows = [filled(EngagementRow, row) for row in answer.result.rows]
+        periods = [filled(PeriodRow, row) for row in answer.result.periods]
+        return filled(EngagementTables, answer.result, **given, engagements=rows, periods=periods)
 
-    def csv(self, answer: CaseAnswer[str, Engagements]) -> bytes:
+    def csv(self, answer: EngagementsAnswer) -> bytes:
         """One of the tables."""
-        return engagements_csv(answer.result, answer.chosen)
+        made, names = answer.result, COLUMNS[answer.chosen]
+        rows = made.rows if answer.chosen == "engagements" else made.periods
+        return table_csv(names, [[_cell(getattr(row, name)) for row in rows] for name in names])
 
     def file_name(self, chosen: str) -> str:
         """The name of the table."""
         return chosen
 
-    def shown(self, answer: CaseAnswer[str, Engagements]) -> Shown:
+    def shown(self, answer: EngagementsAnswer) -> Shown:
         """How many engagements there are, and the first of them; or why the case did not end ok."""
         made = answer.result
         if made.ending != models.OK:
@@ -121,7 +101,7 @@ class EngagementsView(CaseView[EngagementsQuestion, str, Engagements]):
         """Whether there are clutches."""
         return models.has_clutches(study)
 
-    def said(self, answer: CaseAnswer[str, Engagements]) -> Said:
+    def said(self, answer: EngagementsAnswer) -> Said:
         """How many engagements there are, or how the case ended."""
         data = {"ending": answer.result.ending, "engagements": len(answer.result.rows)}
         return Said(data, answer.result.ending == models.OK)

@@ -65,6 +65,9 @@ def selection_spec(
         raise refused("study", "nothing-varies", "no parameter of this study varies") from error
 
 
+ExploreAnswer = StudyAnswer[Chosen, Explored]
+
+
 class ExploreView(StudyView[ExploreQuestion, Chosen, Explored]):
     """All cases of a study at once."""
 
@@ -90,14 +93,14 @@ class ExploreView(StudyView[ExploreQuestion, Chosen, Explored]):
         """The selected cases."""
         return explored(library, study_id, chosen[0])
 
-    def json(self, answer: StudyAnswer[Chosen, Explored]) -> m.Exploration:
+    def json(self, answer: ExploreAnswer) -> m.Exploration:
         """The selection as JSON data."""
         return explored_json(answer.study_id, answer.result)
 
-    def csv(self, answer: StudyAnswer[Chosen, Explored], reading: Reading) -> bytes:
+    def csv(self, answer: ExploreAnswer, reading: Reading) -> bytes:
         """The first rows."""
         return explored_csv(answer.study, answer.result, reading)
 
-    def figure(self, answer: StudyAnswer[Chosen, Explored], columns: int = 2) -> Figure:
+    def figure(self, answer: ExploreAnswer, columns: int = 2) -> Figure:
         """Two quantities of all cases."""
         return explore_figure(answer.result, *answer.chosen[1])

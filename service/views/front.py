@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from sprag_study.worker.study import Study
 
 
+FrontAnswer = StudyAnswer[FrontQuestion, Designs]
+
+
 class FrontView(StudyView[FrontQuestion, FrontQuestion, Designs]):
     """The best designs of a search."""
 
@@ -39,21 +42,19 @@ class FrontView(StudyView[FrontQuestion, FrontQuestion, Designs]):
         """The ranked designs."""
         return library.fronts.of(study_id, exact=chosen.exact)
 
-    def json(self, answer: StudyAnswer[FrontQuestion, Designs]) -> m.FrontReport:
+    def json(self, answer: FrontAnswer) -> m.FrontReport:
         """The designs as JSON data."""
         return front_json(answer.study_id, answer.result, answer.chosen.limit)
 
-    def csv(self, answer: StudyAnswer[FrontQuestion, Designs], reading: Reading) -> bytes:
+    def csv(self, answer: FrontAnswer, reading: Reading) -> bytes:
         """A row for each design."""
         return front_csv(answer.result, answer.study, reading.units, answer.chosen.limit)
 
-    def figure(self, answer: StudyAnswer[FrontQuestion, Designs], columns: int = 2) -> Figure:
+    def figure(self, answer: FrontAnswer, columns: int = 2) -> Figure:
         """The designs over two quantities."""
         return front_figure(answer.result, answer.chosen.x, answer.chosen.y)
 
-    def picture(
-        self, answer: StudyAnswer[FrontQuestion, Designs], reading: Reading, title: str, form: Picture
-    ) -> bytes:
+    def picture(self, answer: FrontAnswer, reading: Reading, title: str, form: Picture) -> bytes:
         """Not too many designs."""
         check_size("designs", len(answer.result.numbers), MAX_PICTURE_POINTS)
         return super().picture(answer, reading, title, form)

@@ -132,7 +132,7 @@ def _found(
     if kind == "measured":
         return calibrated_headline(library.calibrations.of(study_id))
     fetch = partial(library.store.rows.for_cases, study_id)
-    if kind == "tolerances" and study.plan is None and query is None:
+    if study.batched and query is None:
         return batch_headline(study, asked_like(usual_query(library, study_id)), point, fetch)
     mapped = map_plan(study)
     if mapped is not None and query is None:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from sprag_study.service.answers.results import Portrait as PortraitData
 from sprag_study.service.faults import FaultError, choice_of
 from sprag_study.service.figures.portrait import portrait_figure
 from sprag_study.service.languages import N_
-from sprag_study.service.reading.directions import case_values
 from sprag_study.service.results.regimes import motion_sentence
 from sprag_study.service.views.case_questions import STROBES, StrobesQuestion
 from sprag_study.service.views.case_view import CaseAnswer, CaseView
@@ -19,7 +18,6 @@ from sprag_study.worker import models
 from sprag_study.worker.models import Portrait
 
 if TYPE_CHECKING:
-    from sprag_study.service.answers import Value
     from sprag_study.service.figures.figure import Figure
     from sprag_study.worker.study import Study
 
@@ -31,26 +29,25 @@ def require_strobes(study: Study) -> None:
         raise FaultError("not-found", message)
 
 
-def portrait_json(made: Portrait, case: int, parameters: dict[str, Value]) -> PortraitData:
-    """Strobes and orbit as JSON data; ``parameters`` are the axis parameters of the case, SI."""
-    return {
-        "case": case,
-        "parameters": parameters,
-        "regime": made.regime or None,
-        "order": made.order or None,
-        "strobes": timed_values(made.strobes),
-        "orbit": timed_values(made.orbit) if made.orbit.times.size else None,
-        "ending": made.ending,
-    }
+class Strobed:
+    """A view of cases whose motion is looked at once in each period: which studies have it."""
+
+    lacks = N_("has no motion that settles")
+
+    def has(self, study: Study) -> bool:
+        """Whether there are strobes."""
+        return models.has_strobes(study)
 
 
-class StrobesView(CaseView[StrobesQuestion, str, Portrait]):
+StrobesAnswer = CaseAnswer[str, Portrait]
+
+
+class StrobesView(Strobed, CaseView[StrobesQuestion, str, Portrait]):
     """How a case approaches its motion, once per excitation period, and its orbit."""
 
     about = STROBES
     content = "Strobes and orbit as JSON, one of them as CSV, or a picture."
     shape = PortraitData
-    lacks = N_("has no motion that settles")
 
     def choose(self, study: Study, case: int, question: StrobesQuestion) -> str:
         """The table of a CSV file."""
@@ -61,23 +58,28 @@ class StrobesView(CaseView[StrobesQuestion, str, Portrait]):
         """Run the case."""
         return models.run_portrait(study, case)
 
-    def json(self, answer: CaseAnswer[str, Portrait]) -> PortraitData:
+    def json(self, answer: StrobesAnswer) -> PortraitData:
         """Strobes and orbit as JSON data."""
-        return portrait_json(answer.result, answer.case, case_values(answer.study, answer.case))
+        made = answer.result
+        return {
+            "case": answer.case,
+            "parameters": answer.parameters,
+            "regime": made.regime or None,
+            "order": made.order or None,
+            "strobes": timed_values(made.strobes),
+            "orbit": timed_values(made.orbit) if made.orbit.times.size else None,
+            "ending": made.ending,
+        }
 
-    def csv(self, answer: CaseAnswer[str, Portrait]) -> bytes:
+    def csv(self, answer: StrobesAnswer) -> bytes:
         """One of the tables."""
         return trajectory_csv(answer.result.strobes if answer.chosen == "strobes" else answer.result.orbit)
 
-    def figure(self, answer: CaseAnswer[str, Portrait], columns: int = 2, rows: Any = None) -> Figure:
+    def figure(self, answer: StrobesAnswer, columns: int = 2) -> Figure:
         """Orbit and strobes, beside the strobes period by period."""
         return portrait_figure(answer.result, models.presentation_of(answer.study), columns)
 
-    def has(self, study: Study) -> bool:
-        """Whether there are strobes."""
-        return models.has_strobes(study)
-
-    def shown(self, answer: CaseAnswer[str, Portrait]) -> Shown:
+    def shown(self, answer: StrobesAnswer) -> Shown:
         """The settled motion in a sentence."""
         made = answer.result
         return Shown((motion_sentence(made.regime, made.order or None),) if made.regime else ())

@@ -54,10 +54,9 @@ class Relative:
 
 def asked_by(study: Study) -> Asked:
     """What a study asks."""
-    kind = None if study.plan is None else study.plan["kind"]
-    if kind == GOAL:
+    if study.kind == GOAL:
         return "best"
-    if kind == CALIBRATE:
+    if study.kind == CALIBRATE:
         return "measured"
     return "along" if study.spread is None else "tolerances"
 

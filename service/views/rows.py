@@ -63,7 +63,7 @@ def first_rows(study: Study) -> ExploreQuery:
     if is_search(study):
         plan = goal_of(study)
         return replace(query, where=conditions_of(plan, infos_of(study, plan)))
-    if study.spread is None or study.plan is not None:
+    if not study.batched:
         return query
     usual = tuple((axis.paths[0], repr(usual_value(study, axis))) for axis in varying_axes(study))
     return replace(query, at=usual)

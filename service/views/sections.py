@@ -12,23 +12,22 @@ from sprag_study.service.exports import table_csv
 from sprag_study.service.faults import choice_of, parameter_error
 from sprag_study.service.figures.sections import diagram_figure, section_figure
 from sprag_study.service.json_text import numbers
-from sprag_study.service.languages import N_
 from sprag_study.service.reading.catalogue import unit_of
-from sprag_study.service.reading.directions import case_values
 from sprag_study.service.reading.numbers import in_language
 from sprag_study.service.reading.units import QuantityError, typed_value
 from sprag_study.service.results.start_states import refuse_impossible
 from sprag_study.service.views.branch import ENDS_OFFERED, along_offered, named, range_of
 from sprag_study.service.views.case_questions import DIAGRAM, SECTION, DiagramQuestion, SectionQuestion
 from sprag_study.service.views.case_view import CaseAnswer, CaseView
-from sprag_study.service.views.portrait import require_strobes
+from sprag_study.service.views.portrait import Strobed, require_strobes
 from sprag_study.service.views.setting import Offered
-from sprag_study.worker import models
 from sprag_study.worker.models.abilities import run_sections
 from sprag_study.worker.models.common import case_machine
 from sprag_study.worker.models.sections import CaseSections, Sampling
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from sprag_study.service.figures.figure import Figure
     from sprag_study.worker.study import Study
 
@@ -97,15 +96,20 @@ def variable_of(study: Study, name: str | None) -> str:
     return choice_of("y", name, variables(study)) if name and name.strip() else "shaft.speed"
 
 
-def sections_json(made: CaseSections, study: Study, case: int, asked: Sampling, *, section: bool) -> Sections:
-    """The strobes as JSON data."""
+DiagramAnswer = CaseAnswer[tuple[Sampling, str], CaseSections]
+SectionAnswer = CaseAnswer[Sampling, CaseSections]
+
+
+def _json(answer: CaseAnswer[Any, CaseSections], asked: Sampling, along: tuple[str, ...]) -> Sections:
+    """The strobes as JSON data, of a diagram ``along`` a parameter."""
+    made = answer.result
     return {
-        "case": case,
-        "parameters": case_values(study, case),
-        "along": [] if section else list(asked.paths),
-        "unit": None if section else unit_of(study, asked.paths[0]),
+        "case": answer.case,
+        "parameters": answer.parameters,
+        "along": list(along),
+        "unit": unit_of(answer.study, along[0]) if along else None,
         "phase": 2.0 * math.pi * asked.phase,
-        "parameter": [] if section else asked.values.tolist(),
+        "parameter": asked.values.tolist() if along else [],
         "regime": [regime or None for regime in made.regimes],
         "order": [order or None for order in made.orders.tolist()],
         "variables": {name: {"unit": unit} for name, unit in zip(made.names, made.units, strict=True)},
@@ -116,26 +120,22 @@ def sections_json(made: CaseSections, study: Study, case: int, asked: Sampling, 
     }
 
 
-def sections_csv(made: CaseSections, asked: Sampling, *, section: bool) -> bytes:
-    """A row for each strobe: the parameter of a diagram, the regime, the order, the variables."""
+def _csv(made: CaseSections, first: dict[str, NDArray[np.float64]]) -> bytes:
+    """A row for each strobe: the columns that are ``first``, the regime, the order, the variables."""
     kept = ~np.isnan(made.values[:, :, 0])
-    which = np.nonzero(kept)[0].tolist()
-    columns: list[list[Any]] = [[made.regimes[row] for row in which], [int(made.orders[row]) for row in which]]
-    header = ["regime", "order", *made.names]
-    if not section:
-        header.insert(0, asked.paths[0])
-        columns.insert(0, [float(asked.values[row]) for row in which])
-    values = [made.values[:, :, column][kept].tolist() for column in range(len(made.names))]
-    return table_csv(header, [*columns, *values])
+    which = np.nonzero(kept)[0]
+    columns: dict[str, Any] = {name: values[which].tolist() for name, values in first.items()}
+    columns |= {"regime": [made.regimes[row] for row in which.tolist()], "order": made.orders[which].tolist()}
+    columns |= {name: made.values[:, :, column][kept].tolist() for column, name in enumerate(made.names)}
+    return table_csv(columns, columns.values())
 
 
-class DiagramView(CaseView[DiagramQuestion, tuple[Sampling, str], CaseSections]):
+class DiagramView(Strobed, CaseView[DiagramQuestion, tuple[Sampling, str], CaseSections]):
     """A bifurcation diagram: strobes of settled motions along a parameter."""
 
     about = DIAGRAM
     content = "The strobes as JSON or CSV, or a picture."
     shape = Sections
-    lacks = N_("has no motion that settles")
 
     def choose(self, study: Study, case: int, question: DiagramQuestion) -> tuple[Sampling, str]:
         """Where the motions are sampled, and the variable of a picture."""
@@ -147,23 +147,17 @@ class DiagramView(CaseView[DiagramQuestion, tuple[Sampling, str], CaseSections])
         """Settle the case for each value of the parameter."""
         return run_sections(study, case, chosen[0])
 
-    def json(self, answer: CaseAnswer[tuple[Sampling, str], CaseSections]) -> Sections:
+    def json(self, answer: DiagramAnswer) -> Sections:
         """The strobes as JSON data."""
-        return sections_json(answer.result, answer.study, answer.case, answer.chosen[0], section=False)
+        return _json(answer, answer.chosen[0], answer.chosen[0].paths)
 
-    def csv(self, answer: CaseAnswer[tuple[Sampling, str], CaseSections]) -> bytes:
+    def csv(self, answer: DiagramAnswer) -> bytes:
         """A row for each strobe."""
-        return sections_csv(answer.result, answer.chosen[0], section=False)
+        return _csv(answer.result, {answer.chosen[0].paths[0]: answer.chosen[0].values})
 
-    def figure(
-        self, answer: CaseAnswer[tuple[Sampling, str], CaseSections], columns: int = 2, rows: Any = None
-    ) -> Figure:
+    def figure(self, answer: DiagramAnswer, columns: int = 2) -> Figure:
         """One variable at the strobes over the parameter."""
         return diagram_figure(answer.result, answer.study, *answer.chosen)
-
-    def has(self, study: Study) -> bool:
-        """Whether there are strobes."""
-        return models.has_strobes(study)
 
     def offered(self, study: Study, case: int) -> dict[str, Offered]:
         """The parameters, initial values among them, and the variables of a strobe."""
@@ -171,13 +165,12 @@ class DiagramView(CaseView[DiagramQuestion, tuple[Sampling, str], CaseSections])
         return {"along": along_offered(study, case, initial=True), **ENDS_OFFERED, "phase": _PHASE_OFFERED, "y": y}
 
 
-class SectionView(CaseView[SectionQuestion, Sampling, CaseSections]):
+class SectionView(Strobed, CaseView[SectionQuestion, Sampling, CaseSections]):
     """A Poincare section: strobes of the settled motion at a phase of the excitation."""
 
     about = SECTION
     content = "The strobes as JSON or CSV, or a picture."
     shape = Sections
-    lacks = N_("has no motion that settles")
 
     def choose(self, study: Study, case: int, question: SectionQuestion) -> Sampling:
         """Where the motion is sampled."""
@@ -187,21 +180,17 @@ class SectionView(CaseView[SectionQuestion, Sampling, CaseSections]):
         """Settle the case."""
         return run_sections(study, case, chosen)
 
-    def json(self, answer: CaseAnswer[Sampling, CaseSections]) -> Sections:
+    def json(self, answer: SectionAnswer) -> Sections:
         """The strobes as JSON data."""
-        return sections_json(answer.result, answer.study, answer.case, answer.chosen, section=True)
+        return _json(answer, answer.chosen, ())
 
-    def csv(self, answer: CaseAnswer[Sampling, CaseSections]) -> bytes:
+    def csv(self, answer: SectionAnswer) -> bytes:
         """A row for each strobe."""
-        return sections_csv(answer.result, answer.chosen, section=True)
+        return _csv(answer.result, {})
 
-    def figure(self, answer: CaseAnswer[Sampling, CaseSections], columns: int = 2, rows: Any = None) -> Figure:
+    def figure(self, answer: SectionAnswer, columns: int = 2) -> Figure:
         """The strobes in the plane of angle and speed of each pendulum."""
         return section_figure(answer.result, answer.study, answer.chosen)
-
-    def has(self, study: Study) -> bool:
-        """Whether there are strobes."""
-        return models.has_strobes(study)
 
     def offered(self, study: Study, case: int) -> dict[str, Offered]:
         """The phase at which strobes are taken without another."""

@@ -37,6 +37,9 @@ if TYPE_CHECKING:
     from sprag_study.worker.study import Study
 
 
+SensitivityAnswer = StudyAnswer[tuple[str, ...], list[Sensitivity]]
+
+
 class SensitivityView(StudyView[SensitivityQuestion, tuple[str, ...], list[Sensitivity]]):
     """Shares of the variance or elementary effects, and main effects."""
 
@@ -69,29 +72,27 @@ class SensitivityView(StudyView[SensitivityQuestion, tuple[str, ...], list[Sensi
         fetch = partial(store.rows.for_cases, study_id)
         return sensitivity(store.studies.study(study_id), store.studies.spec(study_id), list(chosen), fetch)
 
-    def json(self, answer: StudyAnswer[tuple[str, ...], list[Sensitivity]]) -> Mapping[str, Any]:
+    def json(self, answer: SensitivityAnswer) -> Mapping[str, Any]:
         """The sensitivities as JSON data, with warnings of parameters without effect."""
         record = answer.library.store.studies.get(answer.study_id)
         warnings = warned(answer.library.unaffected.of(answer.library.store, record))
         return {"study": answer.study_id, "results": [item.to_json() for item in answer.result], **warnings}
 
-    def shown(self, answer: StudyAnswer[tuple[str, ...], list[Sensitivity]]) -> Shown:
+    def shown(self, answer: SensitivityAnswer) -> Shown:
         """How they were found, and the shares or effects of each axis."""
         return Shown(
             tuple(_about(item) for item in answer.result), tuple(t for item in answer.result for t in _tables(item))
         )
 
-    def figure(self, answer: StudyAnswer[tuple[str, ...], list[Sensitivity]], columns: int = 2) -> Figure:
+    def figure(self, answer: SensitivityAnswer, columns: int = 2) -> Figure:
         """The mean of each result along each axis, what matters most first."""
         return effects_figure(answer.result, columns)
 
-    def csv(self, answer: StudyAnswer[tuple[str, ...], list[Sensitivity]], reading: Reading) -> bytes:
+    def csv(self, answer: SensitivityAnswer, reading: Reading) -> bytes:
         """The indices."""
         return indices_csv(answer.result, reading)
 
-    def picture(
-        self, answer: StudyAnswer[tuple[str, ...], list[Sensitivity]], reading: Reading, title: str, form: Picture
-    ) -> bytes:
+    def picture(self, answer: SensitivityAnswer, reading: Reading, title: str, form: Picture) -> bytes:
         """Bars and lines."""
         return draw_sensitivity(answer.result, title, reading, form)
 

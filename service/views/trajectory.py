@@ -15,7 +15,6 @@ from sprag_study.service.figures.figure import Figure, Quantity
 from sprag_study.service.figures.motion import motion_figure, phase_figure
 from sprag_study.service.json_text import numbers
 from sprag_study.service.languages import N_
-from sprag_study.service.reading.directions import case_values
 from sprag_study.service.reading.quantities import Units
 from sprag_study.service.reading.reader import Phrase, joined, plural, term
 from sprag_study.service.reading.units import (
@@ -33,7 +32,6 @@ from sprag_study.worker import models
 from sprag_study.worker.models import Trajectory
 
 if TYPE_CHECKING:
-    from sprag_study.service.answers import Value
     from sprag_study.service.answers.results import TimedValues, ValueAxis
     from sprag_study.worker.models import Extent
     from sprag_study.worker.study import Study
@@ -81,30 +79,12 @@ _NOT_AFTER: Final = {
 _ALLOWED: Final = {"time": N_("a time in s or periods"), "angle": N_("an angle in rad, deg or cycles")}
 
 
-def trajectory_json(made: Trajectory, case: int, parameters: dict[str, Value]) -> AngleTable | TrajectoryData:
-    """The values as JSON data; ``parameters`` are the axis parameters of the case, SI."""
-    values = timed_values(made)
-    if made.along == "time":
-        axis: ValueAxis = {"name": "times", "unit": "s"}
-        return {"case": case, "parameters": parameters, "axis": axis, **values, "ending": made.ending}
-    return {
-        "case": case,
-        "parameters": parameters,
-        "axis": {"name": "angles", "unit": "rad"},
-        "angles": values["times"],
-        "variables": values["variables"],
-        "values": values["values"],
-        "phi_c": list(made.phi_c),
-        "ending": made.ending,
-    }
-
-
 def timed_values(made: Trajectory) -> TimedValues:
     """Every variable and state at the times, or angles."""
     return {
         "times": made.times.tolist(),
         "variables": {name: {"unit": unit} for name, unit in zip(made.names, made.units, strict=True)},
-        "values": {name: numbers(made.values[:, column]) for column, name in enumerate(made.names)},
+        "values": dict(zip(made.names, map(numbers, made.values.T), strict=True)),
         "states": {name: list(states) for name, states in made.states.items()},
     }
 
@@ -122,6 +102,9 @@ def trajectory_csv(made: Trajectory, units: Units | None = None) -> bytes:
 _SAMPLES: Final = 6000
 
 
+MotionAnswer = CaseAnswer[tuple[float, float, int], Trajectory]
+
+
 class TrajectoryView(CaseView[TrajectoryQuestion, tuple[float, float, int], Trajectory]):
     """The motion of a case over time, or over the angle."""
 
@@ -137,11 +120,25 @@ class TrajectoryView(CaseView[TrajectoryQuestion, tuple[float, float, int], Traj
         """Run the case."""
         return models.run_trajectory(study, case, *chosen)
 
-    def json(self, answer: CaseAnswer[tuple[float, float, int], Trajectory]) -> AngleTable | TrajectoryData:
+    def json(self, answer: MotionAnswer) -> AngleTable | TrajectoryData:
         """The values as JSON data."""
-        return trajectory_json(answer.result, answer.case, case_values(answer.study, answer.case))
+        made, values = answer.result, timed_values(answer.result)
+        case, parameters, ending = answer.case, answer.parameters, made.ending
+        if made.along == "time":
+            axis: ValueAxis = {"name": "times", "unit": "s"}
+            return {"case": case, "parameters": parameters, "axis": axis, **values, "ending": ending}
+        return {
+            "case": case,
+            "parameters": parameters,
+            "axis": {"name": "angles", "unit": "rad"},
+            "angles": values["times"],
+            "variables": values["variables"],
+            "values": values["values"],
+            "phi_c": list(made.phi_c),
+            "ending": ending,
+        }
 
-    def csv(self, answer: CaseAnswer[tuple[float, float, int], Trajectory]) -> bytes:
+    def csv(self, answer: MotionAnswer) -> bytes:
         """A row for each place."""
         return trajectory_csv(answer.result)
 
@@ -149,13 +146,11 @@ class TrajectoryView(CaseView[TrajectoryQuestion, tuple[float, float, int], Traj
         """None: the file is the motion itself."""
         return ""
 
-    def figure(
-        self, answer: CaseAnswer[tuple[float, float, int], Trajectory], columns: int = 2, rows: object = None
-    ) -> Figure:
+    def figure(self, answer: MotionAnswer, columns: int = 2) -> Figure:
         """The model's panels over time or angle, above the states of its parts; a note where there is no motion."""
         return _stopped(answer) or motion_figure(answer.result, models.presentation_of(answer.study), columns=columns)
 
-    def shown(self, answer: CaseAnswer[tuple[float, float, int], Trajectory]) -> Shown:
+    def shown(self, answer: MotionAnswer) -> Shown:
         """How many places there are, or why there are none."""
         ending, count = answer.result.ending, answer.chosen[2]
         if not len(answer.result.values):
@@ -166,7 +161,7 @@ class TrajectoryView(CaseView[TrajectoryQuestion, tuple[float, float, int], Traj
             text = plural("{count} point over the angle", "{count} points over the angle", count)
         return Shown((joined(", ", (term(ending), text)),))
 
-    def said(self, answer: CaseAnswer[tuple[float, float, int], Trajectory]) -> Said:
+    def said(self, answer: MotionAnswer) -> Said:
         """How many places there are."""
         data = {"ending": answer.result.ending, "points": len(answer.result.values)}
         return Said(data, answer.result.ending == models.OK)
@@ -186,18 +181,16 @@ class PhasesView(TrajectoryView):
         """Whether anything swings."""
         return bool(models.presentation_of(study).portrait)
 
-    def figure(
-        self, answer: CaseAnswer[tuple[float, float, int], Trajectory], columns: int = 2, rows: object = None
-    ) -> Figure:
+    def figure(self, answer: MotionAnswer, columns: int = 2) -> Figure:
         """Speed over angle of each part that swings."""
         return _stopped(answer) or phase_figure(answer.result, models.presentation_of(answer.study))
 
-    def shown(self, answer: CaseAnswer[tuple[float, float, int], Trajectory]) -> Shown:
+    def shown(self, answer: MotionAnswer) -> Shown:
         """Nothing beside it."""
         return Shown()
 
 
-def _stopped(answer: CaseAnswer[tuple[float, float, int], Trajectory]) -> Figure | None:
+def _stopped(answer: MotionAnswer) -> Figure | None:
     """Why a part has no motion, because the run stopped earlier; None where it has one."""
     times, (first, last, _) = answer.result.times, answer.chosen
     if times.size and not times[-1] == first < last:
@@ -205,7 +198,7 @@ def _stopped(answer: CaseAnswer[tuple[float, float, int], Trajectory]) -> Figure
     return Figure(Quantity("", "1"), (), note=_no_motion(answer))
 
 
-def _no_motion(answer: CaseAnswer[tuple[float, float, int], Trajectory]) -> str:
+def _no_motion(answer: MotionAnswer) -> str:
     """The sentence about a run that stopped."""
     made, study, case = answer.result, answer.study, answer.case
     if made.along == "angle":

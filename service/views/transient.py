@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from sprag_study.sentences import Amount, Sentence, Typed, Whole
+from sprag_study.service.answers import filled
 from sprag_study.service.answers.transients import Transient as TransientData
 from sprag_study.service.faults import FaultError, choice_of, parameter_error
 from sprag_study.service.figures.transient import transient_figure
@@ -42,13 +43,6 @@ _OPEN: Final = frozenset({"torque", "revolutions"})
 _DEVIATION: Final = 0.01
 
 
-def require_transients(study: Study) -> None:
-    """Raise FaultError where the study's machine has no transients."""
-    if not has_transients(study):
-        message = f"A machine of model {study.model} has no transients; its motion over time is its trajectory."
-        raise FaultError("not-found", message)
-
-
 def course_of(study: Study, case: int, kind: str, given: Mapping[str, str | None]) -> Course:
     """The transient that is asked for.
 
@@ -66,7 +60,9 @@ def course_of(study: Study, case: int, kind: str, given: Mapping[str, str | None
     FaultError
         About one of the parameters, or because the machine has no transients.
     """
-    require_transients(study)
+    if not has_transients(study):
+        message = f"A machine of model {study.model} has no transients; its motion over time is its trajectory."
+        raise FaultError("not-found", message)
     chosen: Kind = choice_of("kind", kind, KINDS)
     motor, end = has_motor(study), models.extent(study, case).end
     found = {name: _value(name, text, end, motor) for name, text in given.items() if text and text.strip()}
@@ -126,32 +122,12 @@ def results_json(made: Transient) -> dict[str, float | None]:
     return {name: value if math.isfinite(value) else None for name, value in made.results.items()}
 
 
-def transient_json(made: Transient, study: Study, case: int, course: Course) -> TransientData:
-    """The transient as JSON data."""
-    values = timed_values(made.motion)
-    return {
-        "case": case,
-        "parameters": study.case_parameters(case),
-        "kind": course.kind,
-        "load": course.load,
-        "angle": course.angle,
-        "torque": course.torque,
-        "within": course.within,
-        "revolutions": course.revolutions,
-        "outcome": made.outcome,
-        "cause": made.cause,
-        "results": results_json(made),
-        "units": {name: unit for name, unit, _ in RESULTS},
-        "times": values["times"],
-        "variables": values["variables"],
-        "values": values["values"],
-        "ending": made.motion.ending,
-    }
-
-
 def completed(course: Course) -> str:
     """The outcome of a transient that comes to its end."""
     return "stopped" if course.kind == "coasting" else "reached"
+
+
+TransientAnswer = CaseAnswer[tuple[Course, int], Transient]
 
 
 class TransientView(CaseView[TransientQuestion, tuple[Course, int], Transient]):
@@ -175,17 +151,30 @@ class TransientView(CaseView[TransientQuestion, tuple[Course, int], Transient]):
         """Run the transient."""
         return run_transient(study, case, *chosen)
 
-    def json(self, answer: CaseAnswer[tuple[Course, int], Transient]) -> TransientData:
+    def json(self, answer: TransientAnswer) -> TransientData:
         """The transient as JSON data."""
-        return transient_json(answer.result, answer.study, answer.case, answer.chosen[0])
+        made = answer.result
+        values = timed_values(made.motion)
+        return filled(
+            TransientData,
+            answer.chosen[0],
+            case=answer.case,
+            parameters=answer.study.case_parameters(answer.case),
+            outcome=made.outcome,
+            cause=made.cause,
+            results=results_json(made),
+            units={name: unit for name, unit, _ in RESULTS},
+            times=values["times"],
+            variables=values["variables"],
+            values=values["values"],
+            ending=made.motion.ending,
+        )
 
-    def csv(self, answer: CaseAnswer[tuple[Course, int], Transient]) -> bytes:
+    def csv(self, answer: TransientAnswer) -> bytes:
         """Its values over time."""
         return trajectory_csv(answer.result.motion)
 
-    def figure(
-        self, answer: CaseAnswer[tuple[Course, int], Transient], columns: int = 2, rows: object = None
-    ) -> Figure:
+    def figure(self, answer: TransientAnswer, columns: int = 2) -> Figure:
         """Speed, torques and energy over time."""
         return transient_figure(answer.result)
 
@@ -206,7 +195,7 @@ class TransientView(CaseView[TransientQuestion, tuple[Course, int], Transient]):
             "revolutions": Offered(hint="1000"),
         }  # fmt: skip
 
-    def shown(self, answer: CaseAnswer[tuple[Course, int], Transient]) -> Shown:
+    def shown(self, answer: TransientAnswer) -> Shown:
         """Its end and its cause, and the results."""
         made = answer.result
         rows = [
@@ -217,7 +206,7 @@ class TransientView(CaseView[TransientQuestion, tuple[Course, int], Transient]):
         end = joined(" ", (Whole(term(made.outcome)), made.cause))
         return Shown((end,), (ShownTable(_("Results"), (Column(Phrase("Meaning")), Column(Phrase("Value"))), rows),))
 
-    def said(self, answer: CaseAnswer[tuple[Course, int], Transient]) -> Said:
+    def said(self, answer: TransientAnswer) -> Said:
         """Its end and its cause, and the results."""
         data = {"outcome": answer.result.outcome, "cause": answer.result.cause, "results": results_json(answer.result)}
         return Said(data, answer.result.outcome == completed(answer.chosen[0]))

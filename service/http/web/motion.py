@@ -101,18 +101,16 @@ def seen(
 
     It is computed once: views that are opened together are of the same part of a motion.
     """
-    answer = see(study, case, views[0], chosen, start)
-    return [_shown(view, answer, rows, reading, cases) for view in views]
+    answer = replace(see(study, case, views[0], chosen, start), rows=rows)
+    return [_shown(view, answer, reading, cases) for view in views]
 
 
-def _shown(
-    view: CaseView[Any, Any, Any], answer: CaseAnswer[Any, Any], rows: Any, reading: Reading, cases: str
-) -> Seen:
+def _shown(view: CaseView[Any, Any, Any], answer: CaseAnswer[Any, Any], reading: Reading, cases: str) -> Seen:
     study, case = answer.study, answer.case
     shown = NOTHING_MORE if view.about.name == _MOTION.about.name else view.shown(answer)
     if not view.drawn:
         return Seen(shown=shown)
-    made = inline(view.figure(answer, 2, rows), reading, shown, cases)
+    made = inline(view.figure(answer, 2), reading, shown, cases)
     motion = answer.result
     if view.about.name != _MOTION.about.name or not (models.has_clutches(study) and motion.times.size):
         return made

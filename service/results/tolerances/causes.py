@@ -101,5 +101,4 @@ def correlated(study: Study) -> set[str]:
         return set()
     correlated = {path for item in study.spread.about.get("correlations", ()) for path in item["between"]}
     among = re.compile("|".join(re.escape(path).replace(r"\*", r"[^.]+") for path in correlated) or "(?!)")
-    every = study.spread.tolerances
-    return {one.name for one in every if any(among.fullmatch(path) for path in (one.name, *one.paths))}
+    return {one.name for one in study.tolerances if any(among.fullmatch(path) for path in (one.name, *one.paths))}

@@ -36,6 +36,6 @@ def deviations(study: Study) -> NDArray[np.float64]:
         raise ValueError("the study has no tolerances")
     nominal = [
         1.0 if one.change == "scale" else 0.0 if one.change == "offset" else study.base[one.paths[0]]
-        for one in study.spread.tolerances
+        for one in study.tolerances
     ]
     return np.asarray(study.spread.array - np.array(nominal))

@@ -72,7 +72,7 @@ def _percent(share: float) -> str:
 
 def causes_sentences(study: Study, causes: Causes, name: str) -> Iterator[str]:
     """The shares that tolerances have of the variance of a result, and what to know about them."""
-    tolerances = () if study.spread is None else study.spread.names
+    tolerances = [one.name for one in study.tolerances]
     known = [(share.value, share.error, path) for path, share in zip(tolerances, causes.shares, strict=True) if share]
     parts = [
         joined(" ", (Name(path, within=True), f"{_percent(max(value, 0.0)).removesuffix(' %')} ± {_percent(error)}"))

@@ -37,8 +37,7 @@ if TYPE_CHECKING:
 
 def tolerances_json(study: Study) -> list[ToleranceInfo]:
     """The tolerances of a study."""
-    spread = () if study.spread is None else study.spread.tolerances
-    return [{"name": one.name, "change": one.change, "unit": unit_of(study, one.paths[0])} for one in spread]
+    return [{"name": one.name, "change": one.change, "unit": unit_of(study, one.paths[0])} for one in study.tolerances]
 
 
 def _axis(places: Places) -> PlacesAxis | None:
@@ -87,15 +86,14 @@ def _result(study: Study, spread: ResultSpread) -> ResultRibbon:
 
 def causes_json(study: Study, causes: Causes) -> CausesInfo:
     """The causes of a spread."""
-    names = () if study.spread is None else study.spread.names
     return {
         "shares": [
             {
-                "tolerance": name,
+                "tolerance": one.name,
                 "share": None if share is None else share.value,
                 "error": None if share is None else share.error,
             }
-            for name, share in zip(names, causes.shares, strict=True)
+            for one, share in zip(study.tolerances, causes.shares, strict=True)
         ],
         "rest": causes.rest,
         "note": causes.note,
