@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final, Literal
 import numpy as np
 
 from sprag_study.sentences import Sentence
+from sprag_study.service.languages import N_
 from sprag_study.service.spec.axes.axes import PATHS, read_paths
 from sprag_study.service.spec.axes.blocks import Block
 from sprag_study.service.spec.axes.drawn import DRAWN, SampleDistribution, is_distribution, read_distribution
@@ -34,6 +35,13 @@ _METHOD_HELP: Final = (
     "latin_hypercube and sobol fill the ranges evenly, random points are independent; saltelli is the design for Sobol "
     "indices, of count * (ranges + 2) cases; morris are count trajectories of ranges + 1 cases, for elementary effects"
 )
+_METHODS: Final = {
+    "latin_hypercube": N_("Latin hypercube"),
+    "sobol": N_("Sobol sequence"),
+    "random": N_("independent points"),
+    "saltelli": N_("Saltelli, for Sobol indices"),
+    "morris": N_("Morris, for elementary effects"),
+}
 _SECOND_HELP: Final = "of a saltelli sample: indices of pairs too, by count * (2 * ranges + 2) cases"
 MOST_TRAJECTORIES: Final = 1000
 SCALE: Final = choice("scale", "log: even in the logarithm", "linear", "log", default="linear")
@@ -44,7 +52,7 @@ _RANGES: Final = Listed("ranges", 1, MAX_AXES, item=Variants((_RANGE, DRAWN)))
 SAMPLE: Final = Record(
     {
         **named(
-            choice("sample", _METHOD_HELP, "latin_hypercube", "sobol", "random", "saltelli", "morris"),
+            choice("sample", _METHOD_HELP, *_METHODS, label=N_("Kind of sample"), called=_METHODS),
             Described("count", "", "points; sobol and saltelli take a power of 2", "whole", 1, MAX_AXIS_VALUES),
             Described("seed", "", "seed of the random numbers", "whole", 0, 2**32 - 1, 0),
             Described("second_order", "", _SECOND_HELP, "flag", default=False),

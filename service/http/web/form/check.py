@@ -16,8 +16,8 @@ from sprag_study.service.http.web.form.columns import COLUMNS
 from sprag_study.service.http.web.form.entries import Faults, items_of, list_of, range_of
 from sprag_study.service.http.web.form.machine import model_name, places
 from sprag_study.service.http.web.form.machine_spec import step_of
-from sprag_study.service.http.web.form.rows import WAYS
-from sprag_study.service.http.web.form.spec import field_of, spec_of
+from sprag_study.service.http.web.form.spec import WAYS, form_with_spec
+from sprag_study.service.http.web.form.walk import Filled
 from sprag_study.service.jobs.preview import preview_json
 from sprag_study.service.languages import _, gettext, grouped, ngettext
 from sprag_study.service.reading.faults import message
@@ -65,6 +65,7 @@ class Checked:
     words: str = ""
     warnings: tuple[str, ...] = ()
     beside: dict[str, list[str]] = field(default_factory=dict)
+    form: Filled | None = None
 
     @property
     def run(self) -> str:
@@ -121,7 +122,7 @@ def look_over(
         reading = reading_for(checked.parsed.study, checked.parsed.spec, choice or Choice(TYPED))
         checked.words = _words(checked.parsed, checked.preview, reading)
         for text in checked.preview["warnings"]:
-            name, told = ("", None) if "/text" in values else _placed(text, values)
+            name, told = _placed(text, checked.form)
             if name and told is not None:
                 checked.beside.setdefault(name, []).append(reading.warning(told))
             else:
@@ -129,14 +130,14 @@ def look_over(
     return checked
 
 
-def _placed(text: str, values: Mapping[str, str]) -> tuple[str, WarningText | None]:
+def _placed(text: str, form: Filled | None) -> tuple[str, WarningText | None]:
     """The field that a warning is about, "" for none, and what it says there."""
     sentence = getattr(text, "sentence", None)
     place = None if sentence is None else sentence.parts.get("part0")
     told = None if sentence is None else sentence.parts.get("part1")
-    if not isinstance(place, Place) or not isinstance(told, str):
+    if form is None or not isinstance(place, Place) or not isinstance(told, str):
         return "", None
-    return field_of(place.pointer, values), WarningText(told)
+    return form.field_of(place.pointer), WarningText(told)
 
 
 def _words(parsed: ParsedSpec, preview: Preview, reading: Reading) -> str:
@@ -153,13 +154,16 @@ def check_form(
 
     ``known`` counts the cases of a study that need not be run; ``left`` are the seconds until its deadline.
     """
-    spec, faults = spec_of(values)
-    found = Checked(spec, faults=faults, empty=frozenset(name for name, text in values.items() if not text.strip()))
+    spec, form = form_with_spec(values)
+    faults = form.faults
+    found = Checked(
+        spec, faults=faults, form=form, empty=frozenset(name for name, text in values.items() if not text.strip())
+    )
     try:
         found.parsed = parse_spec(spec)
     except SpecError as error:
         for item in error.faults:
-            name = _beside(field_of(item.where or "", values), values.get("edited", ""))
+            name = _beside(form.field_of(item.where or ""), values.get("edited", ""))
             # Faults of unreadable data were reported already, line by line.
             if not (name in faults and name.endswith("/data")):
                 texts = found.faults.setdefault(name, [])

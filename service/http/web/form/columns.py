@@ -9,7 +9,8 @@ from typing import Final
 
 from sprag_study.service.http.web.form.entries import Faults, Values
 from sprag_study.service.http.web.form.fields import Groups
-from sprag_study.service.http.web.form.parts import PARTS, count_of, drop
+from sprag_study.service.http.web.form.parts import count_of, drop
+from sprag_study.service.http.web.form.spec import PARTS
 from sprag_study.service.languages import ENGLISH, current, gettext
 from sprag_study.service.reading.numbers import WITHOUT_DOUBT, is_ambiguous, parse_number, question, settled
 from sprag_study.service.reading.texts import did_you_mean

@@ -15,6 +15,7 @@ from sprag_study.service.languages import ENGLISH, N_, _, current
 from sprag_study.service.reading.reader import Reading
 from sprag_study.service.reading.units import examples
 from sprag_study.service.reading.wording import number, words
+from sprag_study.service.spec.axes.sample import SAMPLE
 from sprag_study.service.spec.described import ANY_RUN, DURATION, SETTLED_RUN, Described
 from sprag_study.service.spec.kinds import goal, refine
 from sprag_study.worker import models
@@ -93,6 +94,11 @@ def refine_fields() -> dict[str, Field]:
 def search_fields() -> list[Field]:
     """The fields of a search that take one number each."""
     return [described(goal.GOAL.described[name], "/goal") for name in ("population", "generations", "seed")]
+
+
+def sample_field() -> Field:
+    """The field for the kind of a sample."""
+    return described(SAMPLE.described["sample"], "/sample")
 
 
 def described(entry: Described, pointer: str) -> Field:

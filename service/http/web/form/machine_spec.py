@@ -17,6 +17,7 @@ from sprag_study.service.http.web.form.entries import (
     text_of,
 )
 from sprag_study.service.http.web.form.machine import BASE, Entry, entries, form_of, rows_of
+from sprag_study.service.http.web.form.walk import Filled
 from sprag_study.service.languages import N_, _, gettext
 from sprag_study.service.reading.faults import allowed_text, fault_text
 from sprag_study.service.reading.numbers import parse_number
@@ -25,15 +26,59 @@ from sprag_study.service.reading.printed import could_be_several
 from sprag_study.service.reading.together import with_last_unit
 from sprag_study.service.reading.units import QuantityError, parse_quantity, split_typed
 from sprag_study.service.reading.wording import unit_text
+from sprag_study.service.spec.derive import formulas_of, with_values
 from sprag_study.service.spec.measured import MeasuredDataError, parse_measured
+from sprag_study.service.spec.report import join
 from sprag_study.worker.models.form import FormChoice, FormField
 
+#: Beginning of a field with the formula of a derived parameter.
+FORMULA: Final = "="
 _STEP: Final = (N_("from"), N_("to"), N_("value"))
 #: Heading and unit of the columns of tables.
 _COLUMNS: Final = {
     "angle": "angle [rad]", "stroke": "fraction", "time": "time [s]", "speed": "speed [rad/s]", "force": "force [N]",
     "torque": "torque [N*m]", "inertia": "inertia [kg*m^2]", "pressure": "pressure [Pa]",
 }  # fmt: skip
+
+
+class Machine:
+    """The base of a spec, with the formulas of its numbers."""
+
+    def entries(self, form: Filled) -> dict[str, Any]:
+        """As of a `Member`."""
+        base = base_of(form.values, form.faults)
+        # What is wrong with an object is shown beside its first field, not beside a choice in it.
+        every = sorted(entries(form.values), key=lambda entry: isinstance(entry.item, FormChoice))
+        form.fields |= {entry.name: entry.name for entry in every}
+        derive = _formulas(base)
+        for path in derive:
+            form.fields[join("/derive", path)] = form.field_of(f"{BASE}/{path.replace('.', '/')}")
+        return {"base": base, **({"derive": derive} if derive else {})}
+
+    def show(self, item: Mapping[str, Any], form: Filled) -> set[str]:
+        """As of a `Member`."""
+        formulas = {path: f"{FORMULA} {text}" for path, text in formulas_of(item).items()}
+        values_of_base(with_values(item["base"], formulas), form.values)
+        return {"base", "derive"}
+
+
+def _formulas(base: dict[str, Any]) -> dict[str, str]:
+    """Take the formulas out of ``base``: they are texts that begin with an equals sign."""
+    formulas: dict[str, str] = {}
+
+    def take(place: Any, prefix: str) -> None:
+        for key, value in list(place.items() if isinstance(place, dict) else enumerate(place)):
+            if isinstance(value, dict | list):
+                take(value, f"{prefix}{key}.")
+            elif isinstance(value, str) and value.startswith(FORMULA):
+                formulas[f"{prefix}{key}"] = value.removeprefix(FORMULA).strip()
+                if isinstance(place, dict):
+                    del place[key]
+                else:
+                    place[key] = None
+
+    take(base, "")
+    return formulas
 
 
 def base_of(values: Mapping[str, str], faults: Faults) -> dict[str, Any]:
@@ -162,19 +207,6 @@ def step_of(pointer: str) -> str:
         return ""
     step = _("step {number}", number=int(found[1]) + 1)
     return f"{step}, {gettext(found[2])}: " if found[2] else f"{step}: "
-
-
-def field_of_base(pointer: str, values: Mapping[str, str]) -> str:
-    """The field beside which a fault at ``pointer`` of the base is shown; "" for the whole form."""
-    known = {entry.name: entry for entry in entries(values)}
-    place = pointer
-    while place not in known and place != BASE:
-        place = place.rpartition("/")[0] or BASE
-    if place in known:
-        return place
-    under = (name for name, entry in known.items()
-             if name.startswith(f"{pointer}/") and isinstance(entry.item, FormField))  # fmt: skip
-    return next(under, "") if pointer != BASE else ""
 
 
 def values_of_base(base: Mapping[str, Any], values: Values) -> None:

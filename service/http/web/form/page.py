@@ -26,7 +26,6 @@ from sprag_study.service.http.threads import in_thread
 from sprag_study.service.http.views import preset_of
 from sprag_study.service.http.web.form import study_check
 from sprag_study.service.http.web.form.beginning import beginning, examples_of
-from sprag_study.service.http.web.form.cases import kinds, methods
 from sprag_study.service.http.web.form.check import Checked
 from sprag_study.service.http.web.form.columns import take_columns
 from sprag_study.service.http.web.form.components import component_groups, rows_with_components, take_component
@@ -38,18 +37,25 @@ from sprag_study.service.http.web.form.fields import (
     refine_fields,
     result_choices,
     run_fields,
+    sample_field,
     search_fields,
 )
-from sprag_study.service.http.web.form.goal import GOAL_DEFAULTS, with_own_units, with_shown_units
+from sprag_study.service.http.web.form.goal import with_own_units, with_shown_units
 from sprag_study.service.http.web.form.live import live_answer, named_numbers
 from sprag_study.service.http.web.form.machine import BASE, choices_of, entries, form_of, model_name
 from sprag_study.service.http.web.form.machine_spec import base_of, values_of_base
 from sprag_study.service.http.web.form.own_machine import own_spec
 from sprag_study.service.http.web.form.parts import count_of, parts_of, reshape, share, unshared
-from sprag_study.service.http.web.form.rows import LIMITS
 from sprag_study.service.http.web.form.sent import changed_kinds, let_vary, settle
 from sprag_study.service.http.web.form.sheet import Sheet, preferred, sheet_of
-from sprag_study.service.http.web.form.spec import REFINE_DEFAULTS, is_search, values_of
+from sprag_study.service.http.web.form.spec import (
+    CONDITIONS,
+    GOAL_DEFAULTS,
+    LIMITS,
+    REFINE_DEFAULTS,
+    is_search,
+    values_of,
+)
 from sprag_study.service.http.web.form.tolerances import BATCH, OWN, distributions, drive_fields, own_name, with_batch
 from sprag_study.service.http.web.form.undo import history_of, remember, undo
 from sprag_study.service.http.web.form.values import Form
@@ -349,8 +355,8 @@ def sheet_form(request: Request, values: Values, checked: Checked | None, opened
         "own_name": own_name,
         "drive_fields": drive_fields(),
         "distributions": distributions(),
-        "sample_methods": methods(),
-        "exclusion_kinds": kinds(),
+        "sample": sample_field(),
+        "conditions": CONDITIONS,
     }
 
 

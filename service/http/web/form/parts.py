@@ -4,68 +4,26 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Final
 
-from sprag_study.service.http.web.form.entries import Values, count_in
+from sprag_study.service.http.web.form.entries import Values
 from sprag_study.service.http.web.form.machine import BASE, entries, form_of
+from sprag_study.service.http.web.form.spec import PARTS
 from sprag_study.service.http.web.form.tolerances import OWN
+from sprag_study.service.http.web.form.walk import Rows
 from sprag_study.service.reading.numbers import whole_number
-from sprag_study.service.spec.kinds.goal import GOAL
-from sprag_study.worker.limits import MAX_AXES
-from sprag_study.worker.models.form import Rows
+from sprag_study.worker.models import form as data
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
-    """A list of rows.
-
-    Attributes
-    ----------
-    pointer : JSON Pointer of the list; the fields of row 0 begin with ``{pointer}/0/``
-    most : largest number of rows
-    entries : fields of which at least one has a text in a row that is filled in, where `rows` does not say it
-    new : initial values of a new row
-    rows : of a list of the machine, what its model says about it
-    """
-
-    pointer: str
-    most: int
-    entries: tuple[str, ...] = ()
-    new: Values = field(default_factory=dict)
-    rows: Rows | None = None
-
-
-#: Correlations that the form shows; a spec may have more.
-_MOST_CORRELATIONS: Final = 20
-
-#: Conditions that the form shows; a spec may have more.
-_MOST_CONDITIONS: Final = 20
-
-#: By the name of the field with the number of rows.
-PARTS: Final = {
-    "axes": Part("/axes", MAX_AXES, new={"way": "linspace"}),
-    "vary": Part("/goal/vary", GOAL.listed["vary"].high, new={"way": "from"}),
-    "best": Part("/goal/best", GOAL.listed["best"].high, new={"toward": "max"}),
-    "subject_to": Part("/goal/subject_to", GOAL.listed["subject_to"].high, new={"kind": "at_most"}),
-    "at": Part("/goal/at", MAX_AXES, ("path", "values")),
-    "ranges": Part("/sample/ranges", MAX_AXES),
-    "exclude": Part("/exclude", _MOST_CONDITIONS, ("path", "value", "and/path", "and/value")),
-    "correlations": Part("/correlations", _MOST_CORRELATIONS),
-}
-
-
-def parts_of(values: Mapping[str, str]) -> dict[str, Part]:
+def parts_of(values: Mapping[str, str]) -> dict[str, Rows]:
     """Every list of a form, by the name of the field with the number of its rows."""
     lists = form_of(values).lists
-    return PARTS | {rows.name: Part(f"{BASE}/{rows.at}", rows.most, rows=rows) for rows in lists}
+    return PARTS | {rows.name: Rows(rows.name, f"{BASE}/{rows.at}", rows.most, listed=rows) for rows in lists}
 
 
 def count_of(values: Mapping[str, str], name: str) -> int:
     """Number of rows of a part; 0 where the form has no such list."""
-    part = parts_of(values).get(name, Part("", 0))
-    least = part.rows.least if part.rows else 0
-    return count_in(values, name, least, least, part.most)
+    part = parts_of(values).get(name)
+    return 0 if part is None else part.count(values)
 
 
 def reshape(values: Values, wanted: str) -> None:
@@ -79,9 +37,9 @@ def reshape(values: Values, wanted: str) -> None:
         _drop_row(values, name, part, place)
 
 
-def _add_row(values: Values, name: str, part: Part) -> None:
+def _add_row(values: Values, name: str, part: Rows) -> None:
     """Add a row, unless there are as many as there may be."""
-    rows, count = part.rows, count_of(values, name)
+    rows, count = part.listed, count_of(values, name)
     if rows is not None and rows.alone and not count:
         _enclose(values, rows)
         count = 1
@@ -98,7 +56,7 @@ def _add_row(values: Values, name: str, part: Part) -> None:
         values[name] = str(count + 1)
 
 
-def _enclose(values: Values, rows: Rows) -> None:
+def _enclose(values: Values, rows: data.Rows) -> None:
     """Make what stands alone the first row of its list; paths that vary or are in formulas follow."""
     for root in dict.fromkeys(item.name.partition("/")[0] for block in rows.blocks for item in block.items):
         inside = f"{rows.at}/0/{root}"
@@ -153,10 +111,10 @@ def unshared(values: Values) -> Values:
     return before
 
 
-def _drop_row(values: Values, name: str, part: Part, index: int) -> None:
+def _drop_row(values: Values, name: str, part: Rows, index: int) -> None:
     """Remove a row, unless there must be as many; those behind it move up."""
     count = count_of(values, name)
-    if index >= count or (part.rows is not None and count <= part.rows.least):
+    if index >= count or (part.listed is not None and count <= part.listed.least):
         return
     for pointer in with_tolerances(part.pointer):
         for row in range(index, count):

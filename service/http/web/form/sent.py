@@ -11,8 +11,8 @@ from typing import Final
 
 from sprag_study.service.http.web.form.entries import Values, names_of
 from sprag_study.service.http.web.form.machine import BASE, entries, form_of, model_name, row_of
-from sprag_study.service.http.web.form.parts import PARTS, count_of, drop, reshape, with_tolerances
-from sprag_study.service.http.web.form.spec import is_search
+from sprag_study.service.http.web.form.parts import count_of, drop, reshape, with_tolerances
+from sprag_study.service.http.web.form.spec import PARTS, is_search
 from sprag_study.service.http.web.form.tolerances import BATCH, own_name
 from sprag_study.service.reading.quantities import is_si
 from sprag_study.service.reading.together import with_last_unit

@@ -14,8 +14,9 @@ from sprag_study.service.figures.drawings import BETWEEN_FIELDS
 from sprag_study.service.figures.painter.elements import text_width
 from sprag_study.service.http.web.form.entries import Values, names_of, plain
 from sprag_study.service.http.web.form.machine import BASE, Block, Entry, blocks, form_of, model_name
-from sprag_study.service.http.web.form.parts import PARTS, count_of
+from sprag_study.service.http.web.form.parts import count_of
 from sprag_study.service.http.web.form.sent import IN_ROW, part_of, varied
+from sprag_study.service.http.web.form.spec import PARTS
 from sprag_study.service.languages import _, gettext
 from sprag_study.service.reading.cyrillic import latin
 from sprag_study.service.reading.numbers import parse_number

@@ -1,64 +1,78 @@
-"""Conversion between the form's fields and the study spec. Only the spec's reader interprets the fields."""
+"""The spec of a study as fields of a form: one description, from which the spec of the fields and the fields of a spec
+are made. Only the spec's reader interprets the fields.
+"""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any, Final
 
-from sprag_study.service.http.web.form.cases import (
-    blocks_of,
-    case_values,
-    exclusions_of,
-    field_of_block,
-    field_of_exclusion,
-    repeated_limits,
-)
 from sprag_study.service.http.web.form.entries import (
     Faults,
     Values,
+    list_of,
+    list_text,
     names_of,
+    path_values,
+    paths_of,
     plain,
+    range_of,
     text_of,
+    unclear,
 )
-from sprag_study.service.http.web.form.goal import GOAL_DEFAULTS, field_of_goal, goal_of, goal_values
 from sprag_study.service.http.web.form.machine import form_of, model_name
-from sprag_study.service.http.web.form.machine_spec import base_of, field_of_base, values_of_base
-from sprag_study.service.http.web.form.rows import field_of_row, filled, items_of_part, values_of_part
-from sprag_study.service.http.web.form.tolerances import FIELDS as TOLERANT
-from sprag_study.service.http.web.form.tolerances import field_of_tolerance, tolerance_values, tolerances_of, with_batch
+from sprag_study.service.http.web.form.machine_spec import Machine
+from sprag_study.service.http.web.form.tolerances import BATCH, FIELDS, Tolerances, with_batch
+from sprag_study.service.http.web.form.walk import Cell, Filled, Record, Rows, chosen, ticked, typed
+from sprag_study.service.languages import N_, _
 from sprag_study.service.reading.together import with_last_unit
-from sprag_study.service.spec.derive import formulas_of, with_values
-from sprag_study.service.spec.kinds import refine
+from sprag_study.service.spec.axes.axes import SWEPT
+from sprag_study.service.spec.axes.sample import SAMPLE, SCALE
+from sprag_study.service.spec.kinds.goal import GOAL
+from sprag_study.service.spec.kinds.refine import REFINE
+from sprag_study.service.spec.report import join
 from sprag_study.service.spec.run import TIMED_DEFAULTS, TIMED_FIELDS, time_text
 from sprag_study.worker import models
+from sprag_study.worker.limits import MAX_AXES
 from sprag_study.worker.models import SETTLED
 
 #: What is asked of a refinement in a form that was not about one.
 REFINE_DEFAULTS: Final[Values] = {
     "/refine/results": "shaft.speed.mean; efficiency",
-    "/refine/error": refine.REFINE.described["error"].default_text,
+    "/refine/error": REFINE.described["error"].default_text,
 }
+#: What a search asks for in a form that was not about one.
+GOAL_DEFAULTS: Final[Values] = {
+    **dict.fromkeys(("vary", "best"), "1"),
+    **dict.fromkeys(("subject_to", "at"), "0"),
+    "/goal/vary/0/way": "from",
+    "/goal/best/0/toward": "max",
+    "/goal/population": GOAL.described["population"].default_text,
+    "/goal/generations": GOAL.described["generations"].default_text,
+    "/goal/over": "worst",
+    "/goal/polish": "on",
+}
+#: Fields of an axis for each way of giving its values.
+WAYS: Final = {
+    "values": ("values",),
+    "linspace": ("from", "to", "count"),
+    "geomspace": ("from", "to", "count"),
+    "range": ("from", "to", "step"),
+    "adaptive": ("from", "to"),
+}
+#: Kinds of limits with their labels.
+LIMITS: Final = (("at_most", N_("at most")), ("at_least", N_("at least")), ("is", N_("equal to")))
+#: Kinds of conditions by which cases are left out, with their labels.
+CONDITIONS: Final = (
+    ("above", N_("above")), ("below", N_("below")), *reversed(LIMITS[:2]), ("is", N_("equal to (one of a list)"))
+)  # fmt: skip
+#: Field with points, as the text of a CSV file.
+POINTS: Final = "/points"
 #: The form's choice for a run of a given time, which a spec expresses by its duration or window.
-TIMED: Final = "time"
-_FIELDS: Final = frozenset(
-    {
-        "sprag",
-        "model",
-        "name",
-        "base",
-        "axes",
-        "combine",
-        "derive",
-        "refine",
-        "goal",
-        "correlations",
-        "exclude",
-        *TOLERANT,
-    }
-)
-#: Beginning of a field with the formula of a derived parameter.
-FORMULA: Final = "="
+_TIMED: Final = "time"
+#: Conditions and correlations that the form shows; a spec may have more.
+_MOST: Final = 20
+_TWICE: Final = N_("this parameter already has a limit of this kind; choose another kind, or leave this part empty")
 
 
 def is_search(values: Mapping[str, str]) -> bool:
@@ -66,132 +80,272 @@ def is_search(values: Mapping[str, str]) -> bool:
     return values.get("asks") == "goal"
 
 
+def _listed(way: str) -> Cell:
+    """Values that a list under the name of the way gives: its ends, and their number or step."""
+    names = WAYS[way]
+    return Cell(
+        (way,), names, lambda form: {way: list(range_of(form.values, f"{form.at}/", names).values())},
+        lambda item: {name: text_of(end) for name, end in zip(names, item[way], strict=True)},
+    )  # fmt: skip
+
+
+def _limit(form: Filled) -> dict[str, Any]:
+    kind = form.text("kind", "at_most")
+    value, within = with_last_unit([form.text("value"), form.text("within") if kind == "is" else ""])
+    return {kind: plain(value), **({"within": plain(within)} if within else {})}
+
+
+def _limit_fields(item: Mapping[str, Any]) -> Values:
+    kind = next(kind for kind, _label in LIMITS if kind in item)
+    within = {"within": text_of(item["within"])} if "within" in item else {}
+    return {"kind": kind, "value": text_of(item[kind]), **within}
+
+
+def _until(form: Filled) -> dict[str, Any]:
+    texts = [form.text(name) for name in ("duration", *_WINDOW.fields)]
+    given = {"duration": plain(texts[0])} if texts[0] else {}
+    if form.text("until", SETTLED) == SETTLED:
+        return {"until": SETTLED, **given}
+    return given if any(texts) else {"duration": time_text(TIMED_DEFAULTS["duration"])}
+
+
+def _window(form: Filled) -> dict[str, Any]:
+    texts = [form.text(name) for name in _WINDOW.fields]
+    return {"window": [plain(text) for text in with_last_unit(texts)]} if any(texts) else {}
+
+
+class _Points:
+    """The operating points of a search: a row has a parameter with its values at all of them."""
+
+    def entries(self, form: Filled) -> dict[str, Any]:
+        """As of a `Member`; the lists of the parameters, value by value."""
+        columns: dict[str, list[Any]] = {}
+        rows = [form.inside(f"{_AT.pointer}/{row}") for row in _AT.filled(form.values)]
+        for row in rows:
+            path, column = row.text("path"), list_of(row.text("values"))
+            if not path or path in columns:
+                form.faults[f"{row.at}/path"] = [
+                    _("is a parameter of the points already") if path else _("is required")
+                ]
+            if fault := _wrong_column(column, next(iter(columns.values()), column)):
+                form.faults[f"{row.at}/values"] = [fault]
+            columns.setdefault(path, column)
+        points = [dict(zip(columns, point, strict=True)) for point in zip(*columns.values(), strict=False)]
+        pointer = f"{form.pointer}/at"
+        form.fields[pointer] = _AT.pointer
+        for index, row in [(index, row) for index in range(max(len(points), 1)) for row in rows]:
+            form.fields.setdefault(f"{pointer}/{index}", f"{row.at}/values")
+            form.fields.setdefault(join(f"{pointer}/{index}", row.text("path")), f"{row.at}/values")
+        return {"at": points} if points else {}
+
+    def show(self, item: Mapping[str, Any], form: Filled) -> set[str]:
+        """As of a `Member`."""
+        points = item.get("at", ())
+        paths = list(points[0]) if points else []
+        form.values["at"] = str(len(paths))
+        for row, path in enumerate(paths):
+            values = "; ".join(text_of(point[path]) for point in points)
+            form.inside(f"{_AT.pointer}/{row}").show({"path": path, "values": values})
+        return {"at"}
+
+
+def _wrong_column(column: list[Any], first: list[Any]) -> str:
+    """What is wrong with the values of a parameter of points, of which the first parameter has ``first``."""
+    if not column:
+        return _("is required; allowed: one value for each operating point")
+    if unclear(column):
+        return _("could be one value or several; allowed: semicolons between values, or no blanks")
+    if len(column) == len(first):
+        return ""
+    return _(
+        "must have as many values as the first parameter, {first}; got {count}; allowed: one value for each "
+        "operating point",
+        first=len(first),
+        count=len(column),
+    )
+
+
+class _Condition:
+    """A condition of one or two parts, which must hold together: objects by path."""
+
+    def _parts(self, form: Filled) -> list[Filled]:
+        """The parts that are filled in."""
+        parts = (form.inside(form.at + part) for part in ("", "/and"))
+        return [part for part in parts if part.text("path") or part.text("value")]
+
+    def filled(self, form: Filled) -> bool:
+        """As of an `Item`."""
+        return bool(self._parts(form))
+
+    def value(self, form: Filled) -> dict[str, Any]:
+        """As of an `Item`; a spec has one limit of a kind for each path."""
+        condition: dict[str, dict[str, Any]] = {}
+        for part in self._parts(form):
+            path, kind, text = part.text("path"), part.text("kind", CONDITIONS[0][0]), part.text("value")
+            items = list_of(text) if kind == "is" else []
+            limits = condition.setdefault(path, {})
+            if kind in limits:
+                form.faults[f"{part.at}/value"] = [_(_TWICE)]
+            limits[kind] = items if len(items) > 1 or unclear(items) else plain(text)
+            pointer = join(form.pointer, path)
+            for known, name in ((form.pointer, "path"), (pointer, "path"), (join(pointer, kind), "value")):
+                form.fields.setdefault(known, f"{part.at}/{name}")
+        return condition
+
+    def fill(self, item: Mapping[str, Any], form: Filled) -> None:
+        """As of an `Item`."""
+        limits = [(path, kind, value) for path, parts in item.items() for kind, value in parts.items()]
+        if not 1 <= len(limits) <= 2:
+            raise ValueError("the form has no fields for all of these conditions")
+        for part, (path, kind, value) in zip(("", "/and"), limits, strict=False):
+            text = "; ".join(map(text_of, value)) if isinstance(value, list) else text_of(value)
+            form.inside(form.at + part).show({"path": path, "kind": kind, "value": text})
+
+
+class _Axes:
+    """Axes, and behind them a sample over ranges and points of a table."""
+
+    def entries(self, form: Filled) -> dict[str, Any]:
+        """As of a `Member`."""
+        axes = PARTS["axes"].entries(form)["axes"]
+        if PARTS["ranges"].filled(form.values) or form.values.get("/sample/count", "").strip():
+            axes.append(_SAMPLE.value(form.inside("/sample", f"/axes/{len(axes)}")))
+        if (points := form.values.get(POINTS, "")).strip():
+            form.fields[f"/axes/{len(axes)}"] = POINTS
+            axes.append({"points": points.replace("\r\n", "\n")})
+        return {"axes": axes}
+
+    def show(self, item: Mapping[str, Any], form: Filled) -> set[str]:
+        """As of a `Member`."""
+        axes = list(item.get("axes", ()))
+        if axes and "points" in axes[-1]:
+            form.values[POINTS] = str(axes.pop()["points"])
+        if axes and isinstance(axes[-1], Mapping) and "sample" in axes[-1]:
+            _SAMPLE.fill(axes.pop(), form.inside("/sample"))
+        return PARTS["axes"].show({"axes": axes}, form)
+
+
+_PATHS: Final = Cell(
+    ("path",), ("path", "tied"), lambda form: {"path": paths_of(form.values, form.at)},
+    lambda item: {name.removeprefix("/"): text for name, text in path_values("", item["path"]).items()},
+)  # fmt: skip
+_RANGE: Final = Cell(
+    ("from", "to"), ("from", "to"), lambda form: range_of(form.values, f"{form.at}/"),
+    lambda item: {name: text_of(item[name]) for name in ("from", "to")},
+)  # fmt: skip
+_VALUES: Final = typed("values", list_of, list_text, always=True)
+_RESULT: Final = typed("result", lambda text: text or None, str, always=True)
+_TOWARD: Final = Cell(
+    ("max",), ("toward",), lambda form: {"max": True} if form.text("toward", "max") == "max" else {},
+    lambda item: {"toward": "max" if item.get("max", False) else "min"}, counts=False,
+)  # fmt: skip
+_LIMIT: Final = Cell((*(kind for kind, _label in LIMITS), "within"), (*["value"] * 3, "within"), _limit, _limit_fields)
+_BETWEEN: Final = Cell(
+    ("between",), ("between/0", "between/1"),
+    lambda form: {"between": [form.text(f"between/{end}") for end in range(2)]},
+    lambda item: {f"between/{end}": item["between"][end] for end in range(2)},
+)  # fmt: skip
+_WINDOW: Final = Cell(
+    ("window",), ("window/0", "window/1"), _window,
+    lambda item: {f"window/{end}": text_of(time) for end, time in enumerate(item.get("window", ()))},
+)  # fmt: skip
+_UNTIL: Final = Cell(
+    ("until", "duration"), ("until", "duration"), _until,
+    lambda item: {"until": _TIMED if set(TIMED_FIELDS) & set(item) else SETTLED}
+    | ({"duration": text_of(item["duration"])} if "duration" in item else {}),
+)  # fmt: skip
+_AT: Final = Rows("at", "/goal/at", MAX_AXES, Record((typed("path"), typed("values"))))
+#: Lists of rows that users add and remove, by the name of the field with their number.
+PARTS: Final = {
+    rows.name: rows
+    for rows in (
+        Rows(
+            "axes", "/axes", MAX_AXES,
+            Record(
+                (_PATHS, chosen(SWEPT.name)), {way: _VALUES if way == "values" else _listed(way) for way in WAYS},
+                "/path",
+            ),
+            new={"way": "linspace"},
+        ),
+        Rows(
+            "vary", "/goal/vary", GOAL.listed["vary"].high, Record((_PATHS,), {"from": _RANGE, "values": _VALUES}),
+            new={"way": "from"},
+        ),
+        Rows(
+            "best", "/goal/best", GOAL.listed["best"].high, Record((_RESULT, _TOWARD), whole="/result"),
+            new={"toward": "max"}, always=False,
+        ),
+        Rows(
+            "subject_to", "/goal/subject_to", GOAL.listed["subject_to"].high,
+            Record((_RESULT, _LIMIT), whole="/result"), new={"kind": "at_most"}, always=False,
+        ),
+        _AT,
+        Rows(
+            "ranges", "/sample/ranges", MAX_AXES, Record((_PATHS, _RANGE, chosen(SCALE.name)), whole="/from"),
+            whole="/sample/count",
+        ),
+        Rows("exclude", "/exclude", _MOST, _Condition(), always=False),
+        Rows(
+            "correlations", "/correlations", _MOST, Record((_BETWEEN, typed("coefficient")), whole="/between/0"),
+            always=False,
+        ),
+    )
+}  # fmt: skip
+_SAMPLE: Final = Record(
+    (
+        chosen("sample", SAMPLE.described["sample"].values[0], always=True), typed("count"), typed("seed"),
+        ticked("second_order"), PARTS["ranges"],
+    ),
+    whole="/count",
+)  # fmt: skip
+_RUN: Final = Record(
+    (_UNTIL, *map(typed, ("at_most", "max_period", "settled", "tolerance")), _WINDOW, chosen("reset", "contact")),
+    key="run", when=lambda values: form_of(values).with_run,
+)  # fmt: skip
+_GOAL: Final = Record(
+    (
+        PARTS["vary"], PARTS["best"], PARTS["subject_to"], _Points(), chosen("over", "worst"),
+        *map(typed, ("population", "generations", "seed")), ticked("polish", usual=True),
+    ),
+    whole="", key="goal", when=is_search, new=GOAL_DEFAULTS,
+)  # fmt: skip
+_REFINE: Final = Record(
+    (typed("results", names_of, "; ".join), *map(typed, REFINE.described)), whole="/results", key="refine",
+    when=lambda values: any(values.get(f"/axes/{row}/way") == "adaptive" for row in PARTS["axes"].filled(values)),
+    new=REFINE_DEFAULTS,
+)  # fmt: skip
+_CASES: Final = Record(
+    (_Axes(), PARTS["exclude"], chosen("combine", "grid", always=True), _REFINE),
+    when=lambda values: not is_search(values),
+)  # fmt: skip
+_BATCH: Final = Record((Tolerances(), *map(typed, FIELDS[1:]), PARTS["correlations"]), when=with_batch)
+_STUDY: Final = Record((typed("name", str), Machine(), _RUN, _BATCH, _GOAL, _CASES))
+
+
+def form_with_spec(values: Mapping[str, str]) -> tuple[dict[str, Any], Filled]:
+    """The spec of a filled form, and the form with what cannot be expressed as a spec and the fields of the rest."""
+    form = Filled(dict(values))
+    return {"sprag": 1, "model": model_name(values), **_STUDY.value(form)}, form
+
+
 def spec_of(values: Mapping[str, str]) -> tuple[dict[str, Any], Faults]:
     """The spec of a filled form, and the faults, by field, of what cannot be expressed as a spec."""
-    faults: Faults = {}
-    base, name = base_of(values, faults), values.get("/name", "").strip()
-    spec: dict[str, Any] = {"sprag": 1, "model": model_name(values), **({"name": name} if name else {}), "base": base}
-    derive = _formulas(base)
-    if derive:
-        spec["derive"] = derive
-    if form_of(values).with_run:
-        spec["run"] = _run(values)
-    spec |= tolerances_of(values)
-    if with_batch(values) and (correlations := items_of_part(values, "correlations")):
-        spec["correlations"] = correlations
-    if is_search(values):
-        return spec | {"goal": goal_of(values, faults)}, faults
-    spec["axes"] = [*items_of_part(values, "axes"), *blocks_of(values).values()]
-    if conditions := exclusions_of(values):
-        spec["exclude"] = conditions
-        faults |= repeated_limits(values)
-    spec["combine"] = values.get("/combine", "grid")
-    if any("adaptive" in axis for axis in spec["axes"]):
-        spec["refine"] = _refine(values)
-    return spec, faults
-
-
-def _refine(values: Mapping[str, str]) -> dict[str, Any]:
-    """What a form with an adaptive axis asks for."""
-    found = _given(values, "/refine", refine.REFINE.described)
-    names = names_of(values.get("/refine/results", ""))
-    return {**({"results": names} if names else {}), **found}
-
-
-def _formulas(base: dict[str, Any]) -> dict[str, str]:
-    """Take the formulas out of ``base``: they are texts that begin with an equals sign."""
-    found: dict[str, str] = {}
-
-    def take(place: Any, prefix: str) -> None:
-        for key, value in list(place.items() if isinstance(place, dict) else enumerate(place)):
-            if isinstance(value, dict | list):
-                take(value, f"{prefix}{key}.")
-            elif isinstance(value, str) and value.startswith(FORMULA):
-                found[f"{prefix}{key}"] = value.removeprefix(FORMULA).strip()
-                if isinstance(place, dict):
-                    del place[key]
-                else:
-                    place[key] = None
-
-    take(base, "")
-    return found
-
-
-def _given(values: Mapping[str, str], pointer: str, names: Iterable[str]) -> dict[str, Any]:
-    """The fields of an object that are filled in."""
-    return {name: plain(text) for name in names if (text := values.get(f"{pointer}/{name}", "").strip())}
-
-
-def _run(values: Mapping[str, str]) -> dict[str, Any]:
-    run = _given(values, "/run", ("at_most", "max_period", "settled", "duration", "tolerance"))
-    window = [plain(text) for text in with_last_unit([values.get(f"/run/window/{index}", "") for index in (0, 1)])]
-    if any(window):
-        run["window"] = window
-    if values.get("/run/until", SETTLED) == SETTLED:
-        run = {"until": SETTLED, **run}
-    elif not any(window):
-        run.setdefault("duration", time_text(TIMED_DEFAULTS["duration"]))
-    if values.get("/run/reset", "contact") != "contact":
-        run["reset"] = values["/run/reset"]
-    return run
+    spec, form = form_with_spec(values)
+    return spec, form.faults
 
 
 def field_of(pointer: str, values: Mapping[str, str]) -> str:
     """The field beside which a fault at ``pointer`` of the spec is shown; "" for the whole form."""
-    if pointer.startswith("/derive/"):
-        pointer = "/base/" + pointer.removeprefix("/derive/").replace(".", "/")
-    if pointer == "/refine" or pointer.startswith("/refine/results"):
-        return "/refine/results"
-    if pointer.startswith("/goal"):
-        return field_of_goal(pointer, values)
-    if pointer.startswith("/tolerances"):
-        return field_of_tolerance(pointer, values)
-    if pointer.startswith("/base"):
-        return field_of_base(pointer, values)
-    if pointer.startswith("/exclude"):
-        return field_of_exclusion(pointer, values)
-    match = re.fullmatch(r"/(axes|correlations)/(\d+)(?:/(.*))?", pointer)
-    if match:
-        name, place, rest = match[1], int(match[2]), match[3] or ""
-        behind = place - len(filled(values, name))
-        if name == "axes" and behind >= 0 and blocks_of(values):
-            return field_of_block(behind, rest, values)
-        return field_of_row(name, place, rest, values)
-    return "/run/window/0" if pointer == "/run/window" else pointer
+    return form_with_spec(values)[1].field_of(pointer)
 
 
 def values_of(spec: Mapping[str, Any]) -> Values:
     """The form's values for ``spec``; raises ValueError where the form cannot show it."""
-    values: Values = {"model": str(spec.get("model")), "/name": str(spec.get("name", ""))}
+    values: Values = {"model": str(spec.get("model")), "/name": "", "asks": "goal" if "goal" in spec else "axes"}
     if values["model"] not in models.model_names():
         raise ValueError("the form does not know the model")
-    known = _FIELDS | {"run"} if form_of(values).with_run else _FIELDS
-    if not set(spec) <= known or spec.get("combine", "grid") not in ("grid", "zip"):
+    values |= {BATCH: "on"} if FIELDS[0] in spec else {}
+    _STUDY.fill({name: entry for name, entry in spec.items() if name not in ("sprag", "model")}, Filled(values))
+    if spec.get("combine", "grid") not in ("grid", "zip") or ("run" in spec and not _RUN.when(values)):
         raise ValueError("the form has no fields for all of this spec")
-    axes = [axis for axis in spec.get("axes", ()) if isinstance(axis, Mapping) and not {"sample", "points"} & set(axis)]
-    blocks = list(spec.get("axes", ()))[len(axes) :]
-    if not all({"sample", "points"} & set(block) for block in blocks):
-        raise ValueError("the form has no fields for all of these axes")
-    values["/combine"] = str(spec.get("combine", "grid"))
-    formulas = {path: f"{FORMULA} {text}" for path, text in formulas_of(spec).items()}
-    values_of_base(with_values(spec["base"], formulas), values)
-    if "run" in known:
-        values |= _run_values(spec.get("run", {}))
-    values |= {"asks": "goal" if "goal" in spec else "axes"} | REFINE_DEFAULTS
-    values |= goal_values(spec["goal"]) if "goal" in spec else GOAL_DEFAULTS
-    for key, content in spec.get("refine", {}).items():
-        values[f"/refine/{key}"] = "; ".join(content) if key == "results" else text_of(content)
-    values |= tolerance_values(spec, values) | values_of_part("correlations", spec.get("correlations", ()))
-    return values | case_values(blocks, spec.get("exclude", ())) | values_of_part("axes", axes)
-
-
-def _run_values(run: Mapping[str, Any]) -> Values:
-    """The form's values for a run."""
-    values: Values = {}
-    values["/run/until"] = TIMED if any(name in run for name in TIMED_FIELDS) else SETTLED
-    for key, content in run.items():
-        if key == "window":
-            values |= {f"/run/window/{index}": text_of(item) for index, item in enumerate(content)}
-        else:
-            values[f"/run/{key}"] = text_of(content)
     return values

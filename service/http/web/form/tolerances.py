@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
-from sprag_study.service.http.web.form.entries import Values, list_of, list_text, names_of, plain, text_of
+from sprag_study.service.http.web.form.entries import list_of, list_text, names_of, plain, text_of
 from sprag_study.service.http.web.form.fields import Field, described
 from sprag_study.service.http.web.form.machine import entries
+from sprag_study.service.http.web.form.walk import Filled
 from sprag_study.service.languages import _
 from sprag_study.service.reading.wording import words
 from sprag_study.service.spec.draws.described import DISTRIBUTION
@@ -44,23 +44,38 @@ def distributions() -> list[tuple[str, str]]:
     return [*((name, _(words(name).lower())) for name in DISTRIBUTION.values), (MEASURED, _("measured values: a list"))]
 
 
-def tolerances_of(values: Mapping[str, str]) -> dict[str, Any]:
-    """The part of a spec about a batch of drives; empty where the form does not ask about one."""
-    if not with_batch(values):
-        return {}
-    items = []
-    for name, plus_minus in _filled(values):
-        path = name.removeprefix(OWN).replace("/", ".")
-        others = names_of(values.get(f"{name}/with", ""))
-        items.append(
-            {
-                "path": [path, *others] if others else path,
-                **_spread(plus_minus, values.get(f"{name}/distribution", _NORMAL)),
-                **({"shared": True} if others else {}),
-            }
-        )
-    settings = {name: plain(values[f"/{name}"]) for name in FIELDS[1:] if values.get(f"/{name}", "").strip()}
-    return {"tolerances": items, **settings}
+class Tolerances:
+    """The tolerances of a batch of drives: fields beside those of the machine."""
+
+    def entries(self, form: Filled) -> dict[str, Any]:
+        """As of a `Member`."""
+        items: list[dict[str, Any]] = []
+        form.fields["/tolerances"] = BATCH
+        for name, text in _filled(form.values):
+            form.fields[f"/tolerances/{len(items)}"] = f"{name}/plus_minus"
+            path, others = name.removeprefix(OWN).replace("/", "."), names_of(form.values.get(f"{name}/with", ""))
+            spread = _spread(text, form.values.get(f"{name}/distribution", _NORMAL))
+            items.append({"path": [path, *others], **spread, "shared": True} if others else {"path": path, **spread})
+        return {"tolerances": items}
+
+    def show(self, item: Mapping[str, Any], form: Filled) -> set[str]:
+        """As of a `Member`, of a machine that the form shows already."""
+        shown = {name.removeprefix("/base/").replace("/", "."): name for name in _tolerant(form.values)}
+        order: list[str] = []
+        for given in item.get("tolerances", ()):
+            listed = given["path"] if isinstance(given["path"], list) else [given["path"]]
+            paths = [path for pattern in listed for path in (expanded(pattern, shown) or [pattern])]
+            for first, *others in [paths] if given.get("shared") else [[path] for path in paths]:
+                if first not in shown:
+                    raise ValueError(f"the form has no field for the tolerance of {first}")
+                name = own_name(shown[first])
+                order.append(name)
+                measured = list_text(given.get("values", ()))
+                form.values[f"{name}/plus_minus"] = measured or text_of(given["plus_minus"])
+                form.values[f"{name}/distribution"] = MEASURED if measured else given.get("distribution", _NORMAL)
+                form.values |= {f"{name}/with": ", ".join(others)} if others else {}
+        form.values |= {ORDER: " ".join(order)} if order else {}
+        return {"tolerances"}
 
 
 def _spread(text: str, distribution: str) -> dict[str, Any]:
@@ -88,36 +103,3 @@ def _tolerant(values: Mapping[str, str]) -> list[str]:
 def own_name(field: str) -> str:
     """Beginning of the names of the fields for the tolerance of the parameter at the pointer ``field``."""
     return OWN + field.removeprefix("/base/")
-
-
-def field_of_tolerance(pointer: str, values: Mapping[str, str]) -> str:
-    """The field for a fault at ``pointer``, which begins with ``/tolerances``."""
-    names = [name for name, _ in _filled(values)]
-    found = re.match(r"/tolerances/(\d+)", pointer)
-    return f"{names[int(found[1])]}/plus_minus" if found and int(found[1]) < len(names) else BATCH
-
-
-def tolerance_values(spec: Mapping[str, Any], values: Mapping[str, str]) -> Values:
-    """The form's values for the tolerances of a spec, whose machine has these ``values``; raises ValueError where the
-    form cannot show them.
-    """
-    if "tolerances" not in spec:
-        return {}
-    found: Values = {BATCH: "on"} | {f"/{name}": text_of(spec[name]) for name in FIELDS[1:] if name in spec}
-    shown = {field.removeprefix("/base/").replace("/", "."): field for field in _tolerant(values)}
-    order: list[str] = []
-    for item in spec["tolerances"]:
-        given = item["path"] if isinstance(item["path"], list) else [item["path"]]
-        paths = [own for path in given for own in (expanded(path, shown) or [path])]
-        groups = [paths] if item.get("shared") else [[path] for path in paths]
-        for first, *others in groups:
-            if first not in shown:
-                raise ValueError(f"the form has no field for the tolerance of {first}")
-            name = own_name(shown[first])
-            order.append(name)
-            measured = list_text(item.get("values", ()))
-            found[f"{name}/plus_minus"] = measured or text_of(item["plus_minus"])
-            found[f"{name}/distribution"] = MEASURED if measured else item.get("distribution", _NORMAL)
-            if others:
-                found[f"{name}/with"] = ", ".join(others)
-    return found | {ORDER: " ".join(order)}
