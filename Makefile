@@ -14,13 +14,14 @@ unexport PYTHONDONTWRITEBYTECODE
 
 CHECKS := mypy ruff imports reference catalogues collect
 
-.PHONY: help demo test check kernels serve docs clean $(CHECKS)
+.PHONY: help demo test check kernels serve docs dist clean $(CHECKS)
 
 help:
 	@echo "make demo [EXIT=1]   set up, run the example study over HTTP, show its curve, then serve (or stop)"
 	@echo "make test            set up and run every check and test"
 	@echo "make serve           set up and run the service"
 	@echo "make docs            build the documentation as a site, which the service shows"
+	@echo "make dist            build a release in dist/: its sources, and the wheel of them"
 	@echo "make clean           remove the environment and what was built"
 
 demo: $(RUNTIME)
@@ -31,6 +32,13 @@ serve: $(RUNTIME)
 
 docs: $(DEV)
 	$(BIN)/python -m docs.site
+
+# The wheel is built from the packed sources, so that it has nothing that they lack. Old builds would be packed as well.
+dist: docs
+	rm -rf build dist *.egg-info/SOURCES.txt
+	$(BIN)/python -c 'from setuptools.build_meta import build_sdist; build_sdist("dist")' >/dev/null
+	$(BIN)/python -m pip --disable-pip-version-check --quiet wheel --no-deps --no-build-isolation --wheel-dir dist dist/*.tar.gz
+	@ls dist
 
 # The tests of one file share processes and servers, so they stay together, as do some files (TOGETHER in tests/conftest.py).
 # Many wait for processes of the program, so that three run side by side even on two cores.

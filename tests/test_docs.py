@@ -2,6 +2,7 @@
 
 import ast
 import re
+import subprocess
 import tomllib
 from collections.abc import Iterator
 from datetime import date
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import typer
+from packaging.requirements import Requirement
 
 from sprag_study.engine.machine_shaft.results import MACHINE_RESULTS
 from sprag_study.engine.vibration_drive.regimes import settled_infos
@@ -129,6 +131,58 @@ def test_the_waiting_loop_of_the_first_study_ends_in_every_state_that_a_study_do
     for state in StudyState:
         stays = state.terminal or state is StudyState.PAUSED
         assert (re.search(pattern, f'{{"id":"x","state":"{state}","model":"m"}}') is not None) is stays, state
+
+
+#: What benchmarks and pages compare Sprag with, and nothing of it imports.
+PEERS = {"adaptive", "cmaes", "optuna", "pymoo"}
+TEXTS = {".cfg", ".css", ".html", ".ipynb", ".js", ".json", ".md", ".po", ".py", ".toml", ".typ", ".yaml"}
+
+
+def texts() -> Iterator[tuple[str, str]]:
+    """Every text of the repository that somebody reads or runs, by its name."""
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    for name in filter(None, listed.split("\0")):
+        path = ROOT / name
+        wanted = path.suffix in TEXTS or path.name in {"Containerfile", "Makefile"}
+        if wanted and path.is_file() and not name.startswith("tests/"):
+            yield name, path.read_text("utf-8")
+
+
+def installed_by(text: str) -> Iterator[str]:
+    """What the commands of a text install, without options, files and folders."""
+    for command in re.findall(r"pipx? install((?: +(?:\\?['\"][^'\"\n]+['\"]|[\w.\[=@{-][^\s`'\")]*))+)", text):
+        for word in re.findall(r"[^\s'\"\\]+", command):
+            if not word.startswith(("-", ".", "$")) and not re.search(r"\.whl|\.txt|/", word):
+                yield word.rstrip(".,:;")
+
+
+def test_no_text_has_foreign_distributions_installed() -> None:
+    """On the index others have taken short names, `sprag` among them."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    needed = [*project["dependencies"], *(name for extra in extras.values() for name in extra)]
+    known = {Requirement(name).name for name in needed} | PEERS
+    seen = 0
+    for name, text in texts():
+        old = name == "CHANGELOG.md"  # its earlier releases tell what they were
+        for word in installed_by(text.partition("\n## 0.9.0")[0] if old else text):
+            seen += 1
+            if word == "sprag-study[{extra}]":  # service/extras.py
+                continue
+            requirement = Requirement(word.replace("NN", "1"))
+            assert requirement.name in known, f"{name}: {word}"
+            assert requirement.name != project["name"] or requirement.extras <= set(extras), f"{name}: {word}"
+        if not old:
+            assert not re.search(r"\b(?:import|from) sprag\b|python3? -m sprag\b|sprag\[[a-z]", text), name
+    assert seen > 10
+
+
+def test_a_foreign_distribution_is_noticed() -> None:
+    assert list(installed_by("run `pip install sprag`, or pip install -U 'sprag[server]' \"numba==0.1\"")) == [
+        "sprag",
+        "sprag[server]",
+        "numba==0.1",
+    ]
 
 
 def test_benchmarks_are_called_as_modules() -> None:

@@ -63,8 +63,11 @@ def test_the_image_has_the_program_and_nothing_of_its_sources(image: Image) -> N
     assert not image.path("/build").exists()
     where = image.run(["/opt/sprag/bin/python", "-c", "import sprag_study; print(sprag_study.__file__)"])
     assert where.startswith(f"{image.root}/opt/sprag/lib/")
-    extras = next(rest for name, rest in steps(RECIPE) if name == "RUN" and "pip" in rest)
-    assert "--constraint constraints.txt '.[postgres,cluster]'" in extras
+    wheel, installation = (rest for name, rest in steps(RECIPE) if name == "RUN" and "pip" in rest)
+    assert "pip wheel" in wheel
+    assert '--constraint constraints.txt "$(ls /build/dist/*.whl)[postgres,cluster]"' in installation
+    stages = [rest for name, rest in steps(RECIPE) if name == "FROM"]
+    assert [stage.partition(" AS ")[2] for stage in stages] == ["wheel", "build", ""]
     assert {name: image.environment[name] for name in ("SPRAG_DATABASE", "SPRAG_KERNEL_CACHE")} == {
         "SPRAG_DATABASE": "/var/lib/sprag/sprag.sqlite3",
         "SPRAG_KERNEL_CACHE": "/var/lib/sprag/kernels",

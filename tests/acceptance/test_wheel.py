@@ -1,17 +1,19 @@
-"""The wheel in an environment of its own, and what lies in the user's folder meanwhile."""
+"""The wheel in environments of its own, of each Python, and what lies in the user's folder meanwhile."""
 
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 import sysconfig
 import tarfile
 import zipfile
-from importlib.metadata import version
+from importlib.metadata import Distribution, distribution, version
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
 
 from sprag_study.service.http.web.manual import PAGES as MANUAL_PAGES
 from tests.acceptance.processes import ROOT, environment
@@ -19,6 +21,7 @@ from tests.acceptance.processes import ROOT, environment
 PACKAGED = ("sprag_study/", "engine/", "worker/", "service/", "migrations/")
 #: Files for those of the site of the documentation, which `make docs` builds before a release is packed.
 SITE = ("index.html", "adr/0001-one.html", "figures/pages/new.png", "assets/main.1a2b.min.css", "style-hash.txt")
+CLIENT = "<class 'sprag_study.service.client.synchronous.client.Client'>"
 STUDY = {
     "sprag": 1,
     "model": "vibration-drive",
@@ -68,6 +71,59 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert done.returncode == 0, done.stderr
     (built,) = folder.glob("*.whl")
     return built
+
+
+def python_of(minor: int) -> Path | None:
+    """A Python 3.``minor`` of this machine: on the path, or one of pyenv's."""
+    name = f"python3.{minor}"
+    places = [shutil.which(name), *sorted((Path.home() / ".pyenv" / "versions").glob(f"3.{minor}.*/bin/{name}"))]
+    for place in filter(None, places):  # a shim on the path need not lead anywhere
+        if run(place, "-c", "import venv", cwd=ROOT).returncode == 0:
+            return Path(place)
+    return None
+
+
+def base_libraries() -> list[Distribution]:
+    """What the base installation needs, and what that needs; all of it is Python of any version."""
+    named: dict[str, Distribution] = {}
+    waiting = ["sprag-study"]
+    while waiting:
+        found = distribution(waiting.pop())
+        for requirement in map(Requirement, found.requires or ()):
+            wanted = requirement.marker is None or requirement.marker.evaluate({"extra": ""})
+            if wanted and requirement.name not in named:
+                named[requirement.name] = distribution(requirement.name)
+                waiting.append(requirement.name)
+    return list(named.values())
+
+
+@pytest.mark.parametrize("minor", [11, 12, 13])
+def test_the_base_installation_is_complete_in_a_clean_environment(wheel: Path, minor: int, tmp_path: Path) -> None:
+    """With copies of the libraries that it names, and of nothing else."""
+    python = python_of(minor)
+    if python is None:
+        pytest.skip(f"this machine has no Python 3.{minor}")
+    subprocess.run([python, "-m", "venv", "--without-pip", tmp_path / "clean"], check=True)
+    programs = tmp_path / "clean" / "bin"
+    libraries = tmp_path / "clean" / "lib" / f"python3.{minor}" / "site-packages"
+    for library in base_libraries():
+        for file in library.files or ():
+            if file.parts[0] != ".." and file.suffix != ".pyc":
+                (libraries / file).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(file.locate(), libraries / file)
+    install = [sys.executable, "-m", "pip", "--python", programs / "python", "install", "--no-index", "--no-compile"]
+    done = run(*install, wheel, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    shown = run(programs / "sprag", "--version", cwd=tmp_path)
+    assert (shown.returncode, shown.stdout) == (0, f"sprag {version('sprag-study')}\n"), shown.stderr
+    script = (
+        "import sprag_study as sprag; print(sprag.__version__, sprag.Client, sprag.preset('one_pendulum')['model'])"
+    )
+    done = run(programs / "python", "-c", script, cwd=tmp_path)
+    assert done.stdout == f"{version('sprag-study')} {CLIENT} vibration-drive\n", done.stderr
+    asked = run(programs / "sprag", "list", "--server", "http://127.0.0.1:9", cwd=tmp_path)
+    assert asked.returncode == 3, asked.stderr
+    assert "Traceback" not in asked.stderr
 
 
 @pytest.fixture(scope="module")
