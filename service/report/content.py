@@ -27,11 +27,12 @@ from sprag_study.service.results.curve_cases import draw, draw_map, select
 from sprag_study.service.results.curves import Curves, Map
 from sprag_study.service.results.defaults import drawn_results, main_query, no_curves, varying_axes
 from sprag_study.service.results.key_answer_words import curve_name, curve_named
-from sprag_study.service.results.key_answers import answers_query, find_answers, usual_curve
+from sprag_study.service.results.key_answers import answers_query, usual_curve
 from sprag_study.service.results.refined import curve_plan
 from sprag_study.service.results.refined_maps import map_plan
 from sprag_study.service.results.sensitivity import Sensitivity, sensitivity
 from sprag_study.service.results.varied import names_in_files
+from sprag_study.service.views.answers import answers_in
 from sprag_study.service.views.curves import completed_query
 from sprag_study.service.views.headline import headline_of
 from sprag_study.service.views.study_questions import ReportQuestion
@@ -126,7 +127,7 @@ class Report:
         if query is None and self.study.cases > 1 and not point:
             return None
         try:
-            found = find_answers(self.study, query if self.chosen is None else self.chosen, point, self.fetch)
+            found = answers_in(self.library, self.study_id, self.chosen or query, point)
             if found.drawn is not None:
                 require_drawable([found.drawn])
         except SelectionError:

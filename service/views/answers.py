@@ -47,8 +47,24 @@ def answers_of(library: Library, study_id: str, chosen: CurveQuery | None, point
         )
     # While a large study runs, all its rows would be read again for each of its chunks.
     over = library.store.studies.get(study_id).over or study.cases <= study_view.FEW
-    whole = partial(whole_columns, library, study_id) if over else None
-    return find_answers(study, query, point, partial(library.store.rows.for_cases, study_id), whole)
+    return answers_in(library, study_id, query, point, overall=over)
+
+
+def answers_in(
+    library: Library, study_id: str, query: CurveQuery | None, point: str | None, *, overall: bool = False
+) -> StudyAnswers:
+    """The answers of curves, found once until the study has other rows; raises as `find_answers` does.
+
+    The extremes among all cases only if ``overall``.
+    """
+
+    def find() -> StudyAnswers:
+        whole = partial(whole_columns, library, study_id) if overall else None
+        fetch = partial(library.store.rows.for_cases, study_id)
+        return find_answers(library.store.studies.study(study_id), query, point, fetch, whole)
+
+    revision = library.store.studies.get(study_id).revision
+    return library.answers.of((study_id, revision, query, point, overall), find)
 
 
 def whole_columns(library: Library, study_id: str, names: Sequence[str]) -> CaseColumns:

@@ -22,11 +22,11 @@ from sprag_study.service.results.headlines.batch import asked_like, batch_headli
 from sprag_study.service.results.headlines.calibrated import calibrated_headline
 from sprag_study.service.results.headlines.headline import Headline, KeyNumber, Trace, amount, digits
 from sprag_study.service.results.headlines.search import search_headline
-from sprag_study.service.results.key_answers import answers_query, find_answers
+from sprag_study.service.results.key_answers import answers_query
 from sprag_study.service.results.refined_maps import map_plan
 from sprag_study.service.results.sweeps import hysteresis
 from sprag_study.service.storage.database.session import in_one_moment
-from sprag_study.service.views.answers import whole_columns
+from sprag_study.service.views.answers import answers_in
 from sprag_study.service.views.relatives import asked_by
 from sprag_study.service.views.study_view import FEW
 from sprag_study.worker import models
@@ -138,8 +138,8 @@ def _found(
     if mapped is not None and query is None:
         return _of_map(study, mapped, fetch(np.arange(study.cases, dtype=np.int64), mapped.results))
     asked = answers_query(study, query or usual_query(library, study_id))
-    whole = partial(whole_columns, library, study_id) if asked is None and study.cases > 1 else None
-    found = find_answers(study, asked, point if asked is not None else None, fetch, whole)
+    overall = asked is None and study.cases > 1
+    found = answers_in(library, study_id, asked, point if asked is not None else None, overall=overall)
     told = along_headline(study, found, curve, asked=bool(point))
     if study.sweep is not None and found.drawn is not None and (text := hysteresis(found.drawn)):
         told = replace(told, sentence=(*told.sentence[:1], joined("", [text])))

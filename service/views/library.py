@@ -20,11 +20,14 @@ if TYPE_CHECKING:
 
     from sprag_study.service.reading.reader import Phrase
     from sprag_study.service.results.headlines.headline import Headline
+    from sprag_study.service.results.key_answers import StudyAnswers
     from sprag_study.worker.chunking import Chunking
 
 #: Headlines that are kept: of questions, and of listed studies.
 _TOLD: Final = 512
 _LISTED: Final = 2000
+#: Answers that are kept with their curves, for what one page shows of them.
+_ANSWERS: Final = 8
 
 
 def reading_of(store: Store, study_id: str, choice: Choice) -> Reading:
@@ -48,6 +51,8 @@ class Library:
         self.calibrations = Calibrations(store)
         #: Headlines by study, its revision, and the question.
         self.told: Kept[tuple[object, ...], Headline] = Kept(LRUCache(_TOLD))
+        #: Answers of curves by study, its revision, and the question.
+        self.answers: Kept[tuple[object, ...], StudyAnswers] = Kept(LRUCache(_ANSWERS))
         self.unaffected = Unaffected()
         #: Of listed studies the revision, and headline and description where they have them (`views.listed`).
         self.headlines: Kept[str, tuple[int, tuple[Headline, Phrase] | None]] = Kept(LRUCache(_LISTED))

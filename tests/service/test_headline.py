@@ -9,7 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sprag_study.service.http.web.sheet.view import sheet_of
 from sprag_study.service.reading.reader import Choice, Reading
+from sprag_study.service.results import key_answers
+from sprag_study.service.results.curve_cases import draw
 from sprag_study.service.results.defaults import usual_value
 from sprag_study.service.results.headlines.headline import KeyNumber
 from sprag_study.service.spec.document import parse_spec
@@ -222,3 +225,22 @@ def test_the_only_pendulum_of_a_machine_is_not_named() -> None:
     several = Reading("vibration-drive", single=single_parts([*paths, "pendulums.1.arm"]))
     assert several.caption("pendulums.0.spring_rate") == "Spring rate, pendulum 0"
     assert reading.letter("shaft.irregularity") == "<i>δ</i><sub>ω</sub>"  # δ is the backlash in drawings
+
+
+def test_a_sheet_reads_its_answers_once(service: Service, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its sentence and its chart are of the same curves; rows that come later are read."""
+    study_id = run(service, {**SPEC, "axes": [{"path": "shaft.load", "values": [0.1, 0.2, 0.3]}], "combine": "grid"})
+    drawn: list[object] = []
+
+    def counted(*given: Any) -> Any:
+        drawn.append(given)
+        return draw(*given)
+
+    monkeypatch.setattr(key_answers, "draw", counted)
+    library, choice = Library(service.store), Choice()
+    first = sheet_of(library, study_id, [], choice, f"/studies/{study_id}/cases")
+    assert len(drawn) == 1
+    assert sheet_of(library, study_id, [], choice, f"/studies/{study_id}/cases").say == first.say
+    assert len(drawn) == 1
+    sheet_of(library, study_id, [("point", "0.2")], choice, f"/studies/{study_id}/cases")
+    assert len(drawn) == 2

@@ -72,14 +72,19 @@ def _percent(share: float) -> str:
 
 def causes_sentences(study: Study, causes: Causes, name: str) -> Iterator[str]:
     """The shares that tolerances have of the variance of a result, and what to know about them."""
-    tolerances = [one.name for one in study.tolerances]
-    known = [(share.value, share.error, path) for path, share in zip(tolerances, causes.shares, strict=True) if share]
+    pairs = zip(study.tolerances, causes.shares, strict=True)
+    known = [(share.value, share.error, one.name) for one, share in pairs if share]
     parts = [
-        joined(" ", (Name(path, within=True), f"{_percent(max(value, 0.0)).removesuffix(' %')} ± {_percent(error)}"))
+        Phrase(
+            "{name} ({share} ± {error})",
+            name=Name(path, within=True),
+            share=_percent(max(value, 0.0)).removesuffix(" %"),
+            error=_percent(error),
+        )
         for value, error, path in sorted(known, reverse=True)
     ]
     if parts:
-        shares = joined(", ", parts)
+        shares = joined("; ", parts)
         yield Phrase("Shares of the variance of {name}: {shares}.", name=Name(name, within=True), shares=shares)
     if causes.note:
         yield joined("", (causes.note, "."))

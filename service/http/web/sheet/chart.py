@@ -31,12 +31,13 @@ from sprag_study.service.results.headlines.along import (
 from sprag_study.service.results.headlines.batch import asked_like
 from sprag_study.service.results.headlines.headline import amount
 from sprag_study.service.results.key_answer_words import curve_name
-from sprag_study.service.results.key_answers import answers_query, find_answers
+from sprag_study.service.results.key_answers import answers_query
 from sprag_study.service.results.refined import curve_plan
 from sprag_study.service.results.refined_maps import map_plan
 from sprag_study.service.results.selection import numeric_names
 from sprag_study.service.results.stored_curves import drawn_curves, stored_map
 from sprag_study.service.results.tolerances.ribbons import QUANTILES
+from sprag_study.service.views.answers import answers_in
 from sprag_study.service.views.calibration import CalibrationView
 from sprag_study.service.views.drives import RibbonQuery, RibbonView
 from sprag_study.service.views.front import FrontView
@@ -270,7 +271,7 @@ def answers_of_address(
     study = library.store.studies.study(study_id)
     query = answers_query(study, chosen_curves(study, params, usual))
     point = point_of(study, query, params, reading)
-    return find_answers(study, query, point, partial(library.store.rows.for_cases, study_id))
+    return answers_in(library, study_id, query, point)
 
 
 def chosen_curves(study: Study, params: QueryParams, usual: CurveQuery | None) -> CurveQuery | None:

@@ -48,17 +48,18 @@ def machine_of(
     """
     best = _whole(study, best) if best else best
     shown = replace(study, base={**study.base, **best})
+    ends = _ends(shown)
     form = models.model_of(study.model).presentation.form
     seen = {item.path: item.origin != "default" for item in inputs(study, spec)
             if item.path in study.base and form.in_sight(item.path)}  # fmt: skip
     links = {path: f"{variant}#/base/{path.replace('.', '/')}" for path in seen}
     found = []
     for drawing in drawings(shown):
-        labels = {each.path: _label(shown, reading, each.path, best) for each in drawing.dimensions}
+        labels = {each.path: _label(shown, reading, each.path, best, ends) for each in drawing.dimensions}
         drawn = replace(drawing, about=gettext(drawing.about))
         found.append(Markup(svg(drawn, labels, links)))  # noqa: S704 - its texts are escaped
         seen |= dict.fromkeys(labels, False)
-    others = [(reading.caption(path), _label(shown, reading, path, best), links[path])
+    others = [(reading.caption(path), _label(shown, reading, path, best, ends), links[path])
               for path, alone in seen.items() if alone]  # fmt: skip
     return Machine(tuple(found), tuple(others))
 
@@ -71,23 +72,21 @@ def _whole(study: Study, best: Mapping[str, float]) -> dict[str, float]:
     return known | {path: float(column[0]) for path, column in derived.items()}
 
 
-def _label(study: Study, reading: Reading, path: str, best: Mapping[str, float]) -> str:
+def _label(
+    study: Study, reading: Reading, path: str, best: Mapping[str, float], ends: Mapping[str, tuple[float, float]]
+) -> str:
     """The value at a dimension: the ends of what varies, the width of a tolerance."""
     si = unit_of(study, path)
-    low, high = (best[path],) * 2 if path in best else _ends(study, path)
+    low, high = (best[path],) * 2 if path in best else ends.get(path, (study.base[path],) * 2)
     if low != high:
-        ends = (number(reading.value(end, si), DIMENSION_DIGITS) for end in (low, high))
-        return f"{'…'.join(ends)} {unit_text(reading.unit(si))}".strip()
+        both = (number(reading.value(end, si), DIMENSION_DIGITS) for end in (low, high))
+        return f"{'…'.join(both)} {unit_text(reading.unit(si))}".strip()
     return reading.say(joined("", [with_tolerance(study, path, Amount(low, si, DIMENSION_DIGITS))]))
 
 
-def _ends(study: Study, path: str) -> tuple[float, float]:
-    """The least and the largest value of a number of the machine in all cases; of a batch, of its nominal drive."""
-    axis = study.axis_of(path)
-    if axis is not None:
-        values = study.axes[axis].array
-    elif path in study.derive and study.spread is None:
-        values = study.columns(range(study.cases))[path]
-    else:
-        return study.base[path], study.base[path]
-    return float(values.min()), float(values.max())
+def _ends(study: Study) -> dict[str, tuple[float, float]]:
+    """The least and the largest value in all cases of each number that varies; of a batch, of its nominal drive."""
+    varying = {path: axis.array for axis in study.axes for path in axis.paths}
+    if study.derive and study.spread is None:
+        varying |= study.columns(range(study.cases))
+    return {path: (float(values.min()), float(values.max())) for path, values in varying.items()}

@@ -8,6 +8,7 @@ from scipy.stats import norm, qmc
 
 from sprag_study.service.results.tolerances import causes
 from sprag_study.service.results.tolerances.shares import LEAST_DRIVES, Share, shares
+from sprag_study.service.results.tolerances.told import causes_sentences
 from sprag_study.service.spec.document import parse_spec
 from tests.service.results.tolerances.conftest import SPEC
 
@@ -67,3 +68,10 @@ def test_what_scatters_around_no_share_is_no_interaction(monkeypatch: pytest.Mon
     found = causes.variance_causes(study, np.zeros((512, 1)))
     assert found.rest == pytest.approx(0.03)
     assert [share and share.value for share in found.shares] == [0.97, -0.1, -0.08]
+
+
+def test_shares_are_told_apart_from_the_numbers_of_parts() -> None:
+    """Captions end with numbers of parts: ``backlash, pendulum 0``."""
+    known = causes.Causes((Share(0.5, 0.04), Share(0.3, 0.02), Share(0.2, 0.01)), 0.0)
+    (sentence,) = causes_sentences(parse_spec(SPEC).study, known, "speed")
+    assert sentence.endswith(": first (50.0 ± 4.0 %); second (30.0 ± 2.0 %); third (20.0 ± 1.0 %).")
