@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
@@ -222,13 +223,13 @@ def typed_units(study: Study, spec: Mapping[str, Any]) -> dict[str, str]:
     return {si: counter.most_common(1)[0][0] for si, counter in votes.items()}
 
 
-def typed_unit(base: object, path: str) -> str:
-    """The unit in which ``base`` has the quantity at a path; "" where it has none there."""
-    text = next((text for known, text in _texts(base, "") if known == path), "")
-    try:
-        return split_quantity(text)[1] if text else ""
-    except QuantityError:
-        return ""
+def units_in(base: object) -> dict[str, str]:
+    """The unit of each text of ``base`` that is a quantity, by path."""
+    units = {}
+    for path, text in _texts(base, ""):
+        with suppress(QuantityError):
+            units[path] = split_quantity(text)[1]
+    return units
 
 
 def _quantities(study: Study, spec: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

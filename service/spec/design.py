@@ -7,7 +7,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag_study.service.reading.catalogue import unit_of
-from sprag_study.service.reading.quantities import typed_unit, typed_units
+from sprag_study.service.reading.quantities import typed_units, units_in
 from sprag_study.service.reading.units import QuantityError, exact_quantity
 from sprag_study.service.spec.derive import with_values
 from sprag_study.service.spec.fields import renamed
@@ -40,10 +40,10 @@ def design_spec(spec: Mapping[str, Any], study: Study, case: int, along: str | N
     """
     apart = {*study.derive, *NO_PARAMETERS}
     values = {path: value for path, value in study.case_parameters(case).items() if path not in apart}
-    typed = typed_units(study, spec)
+    typed, units = typed_units(study, spec), units_in(spec["base"])
 
     def text(path: str, value: float) -> float | str:
-        return _text(study, path, value, typed_unit(spec["base"], path), typed)
+        return _text(study, path, value, units.get(path, ""), typed)
 
     # The nominal drive of a design keeps its tolerances; a drawn drive has its own values in the base.
     nominal = not study.case_parameters(case).get(DRIVE)

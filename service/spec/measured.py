@@ -11,8 +11,10 @@ import csv
 import itertools
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +23,7 @@ from sprag_study.sentences import Amount, Sentence, WarningText, plural
 from sprag_study.service.faults import Fault, FaultError
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.numbers import WITHOUT_DOUBT, assumption, is_ambiguous, of_line, parse_number, question
-from sprag_study.service.reading.units import QuantityError
+from sprag_study.service.reading.units import QuantityError, parse_exact, to_float
 from sprag_study.service.spec.csv_text import not_csv
 from sprag_study.service.spec.table_text import (
     CsvRow,
@@ -74,15 +76,9 @@ class MeasuredDataError(FaultError):
         super().__init__("invalid-data", "\n".join(map(str, faults)), faults)
 
 
-def parse_measured(text: str, convert: Callable[[str, str], float]) -> MeasuredData:
-    """Read the measured rows of ``text``.
-
-    Parameters
-    ----------
-    text : str
-        The file's text.
-    convert : function of (quantity, SI unit)
-        Converts a quantity such as "1 deg" to an SI number; raises ValueError for a wrong unit.
+@lru_cache(maxsize=8)
+def parse_measured(text: str) -> MeasuredData:
+    """Read the measured rows of the text of a file.
 
     Raises
     ------
@@ -99,8 +95,8 @@ def parse_measured(text: str, convert: Callable[[str, str], float]) -> MeasuredD
     units: tuple[str | None, str | None] = (None, None)
     if _is_header(rows[0].cells):
         rows = with_units(rows)
-        units = _units_of_row(rows.pop(0), convert)
-    return _numbers(table._replace(rows=rows), units, convert)
+        units = _units_of_row(rows.pop(0))
+    return _numbers(table._replace(rows=rows), units)
 
 
 def _split(text: str) -> Split:
@@ -126,7 +122,7 @@ def _is_header(cells: list[str]) -> bool:
     return all(parse_number(cell) is None and not is_ambiguous(cell) for cell in cells)
 
 
-def _units_of_row(row: CsvRow, convert: Callable[[str, str], float]) -> tuple[str | None, str | None]:
+def _units_of_row(row: CsvRow) -> tuple[str | None, str | None]:
     """Units of the two columns in the header; None for a column without a unit."""
     if len(row.cells) != len(_QUANTITIES):
         given = ", ".join(row.cells)[:80]
@@ -140,7 +136,7 @@ def _units_of_row(row: CsvRow, convert: Callable[[str, str], float]) -> tuple[st
     problems = []
     for cell, (name, unit), words in zip(row.cells, _QUANTITIES, _WORDS, strict=True):
         try:
-            units.append(_unit(cell, unit, words, convert))
+            units.append(_unit(cell, unit, words))
         except ValueError as error:
             where = f"line {row.line}"
             what = getattr(error, "message", str(error))
@@ -151,7 +147,7 @@ def _units_of_row(row: CsvRow, convert: Callable[[str, str], float]) -> tuple[st
     return units[0], units[1]
 
 
-def _unit(heading: str, unit: str, words: frozenset[str], convert: Callable[[str, str], float]) -> str | None:
+def _unit(heading: str, unit: str, words: frozenset[str]) -> str | None:
     found = _UNIT_IN_HEADER.search(heading)
     text = ((found[1] or found[2]) if found else heading.rpartition(" ")[2]).strip()
     if text.lower() in words:
@@ -159,7 +155,7 @@ def _unit(heading: str, unit: str, words: frozenset[str], convert: Callable[[str
     if found is None and len(text) < 2:
         message = Sentence("'{heading}' names neither the quantity nor its unit", heading=heading)
         raise QuantityError("wrong-unit", message)
-    convert(f"1 {text}", unit)  # refuses units of other quantities
+    parse_exact(f"1 {text}", unit)  # refuses units of other quantities
     return text
 
 
@@ -188,7 +184,7 @@ def _assumed(units: tuple[str | None, str | None], rows: NDArray[np.float64]) ->
         yield WarningText(text, "implausible-value")
 
 
-def _numbers(table: Split, units: tuple[str | None, str | None], convert: Callable[[str, str], float]) -> MeasuredData:
+def _numbers(table: Split, units: tuple[str | None, str | None]) -> MeasuredData:
     rows, doubt = settled_table(table)
     problems = list(itertools.islice(_wrong_rows(table, rows), _MAX_PROBLEMS))
     if doubt is not None and not doubt.likely:
@@ -204,11 +200,11 @@ def _numbers(table: Split, units: tuple[str | None, str | None], convert: Callab
         allowed = Sentence("1 .. {high} rows", high=str(MAX_CLUTCH_ROWS))
         raise MeasuredDataError([Fault("data", "empty" if not rows else "too-many", message, len(rows), allowed)])
     numbers = np.array([[parse_number(cell) for cell in row.cells] for row in rows], dtype=np.float64)
-    columns = zip(numbers.T.tolist(), units, _QUANTITIES, strict=True)
-    scaled = np.array([
-        column if unit is None else [_converted(value, unit, si, convert) for value in column]
-        for column, unit, (_, si) in columns
-    ]).T  # fmt: skip
+    sizes = [
+        None if unit is None else parse_exact(f"1 {unit}", si) for unit, (_, si) in zip(units, _QUANTITIES, strict=True)
+    ]
+    scaled = np.array([[_converted(*cell) for cell in zip(row, sizes, strict=True)] for row in numbers.tolist()])
+    scaled.flags.writeable = False  # those of the same text share it
     warnings = list(_assumed(units, numbers))
     if doubt is not None:
         text = of_line(doubt.line, assumption(doubt.text))
@@ -216,12 +212,12 @@ def _numbers(table: Split, units: tuple[str | None, str | None], convert: Callab
     return MeasuredData(scaled, tuple(row.line for row in rows), tuple(warnings))
 
 
-def _converted(value: float, unit: str, si: str, convert: Callable[[str, str], float]) -> float:
+def _converted(value: float, size: Fraction | None) -> float:
     """A number of a column in SI, rounded once as one that is typed with its unit; at the ends of the doubles twice."""
     try:
-        return convert(f"{value!r} {unit}", si)
-    except ValueError:
-        return value * convert(f"1 {unit}", si)
+        return value if size is None else to_float(Fraction(repr(value)) * size)
+    except QuantityError:
+        return value * float(size or 1)
 
 
 def _wrong_rows(written: Split, rows: Sequence[CsvRow]) -> Iterator[Fault]:

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from sprag_study.service.http.api import examples
-from sprag_study.service.reading.units import parse_quantity
 from sprag_study.service.results.unaffected import unaffected
 from sprag_study.service.schedules.deadline import finish_warnings
 from sprag_study.service.spec.document import parse_spec
@@ -113,7 +112,7 @@ def of_data() -> Iterator[str]:
     """Warnings about measured clutches and laws."""
     for text in ("1,2\n3,4\n", "angle_rad,torque\n1,2\n3,4\n", "angle,torque_Nm\n0.01,2\n0.02,4\n",
                  "angle_deg,torque_Nmm\n1.000,20.000\n2.000,30.000\n"):  # fmt: skip
-        yield from parse_measured(text, parse_quantity).warnings
+        yield from parse_measured(text).warnings
     degrees = np.arange(0.25, 3.1, 0.25)
     data = np.column_stack((np.radians(degrees), 3.5 * degrees + 0.1 * degrees**3))
     yield from models.fit_clutch(data, 0.05, angles_include_backlash=True, backlash=math.radians(0.1)).warnings

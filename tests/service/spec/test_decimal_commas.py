@@ -145,12 +145,12 @@ def test_points_and_measured_columns() -> None:
         assert loads.tolist() == pytest.approx([0.1005, 0.001234], rel=1e-15)
     text = "shaft.load\texcitation.frequency\n1,234\t25\n"
     assert problems(points(text))["/axes/0/points"].code == "ambiguous-comma"
-    rows = parse_measured("угол [град]; момент_Нмм\n0,25;878,5\n1,234;1000\n", parse_quantity).rows
+    rows = parse_measured("угол [град]; момент_Нмм\n0,25;878,5\n1,234;1000\n").rows
     assert rows[:, 1].tolist() == pytest.approx([0.8785, 1.0])
     assert rows[1, 0] == pytest.approx(math.radians(1.234))
-    assert len(parse_measured("0,1\t1,234\n0,2\t2,345\n", parse_quantity).rows) == 2
+    assert len(parse_measured("0,1\t1,234\n0,2\t2,345\n").rows) == 2
     with pytest.raises(MeasuredDataError) as caught:
-        parse_measured("1,234\t2,345\n", parse_quantity)
+        parse_measured("1,234\t2,345\n")
     assert {fault.code for fault in caught.value.faults} == {"ambiguous-comma"}
 
 

@@ -17,7 +17,6 @@ from sprag_study.sentences import Sentence
 from sprag_study.service.languages import catalogue, language
 from sprag_study.service.languages.catalogue import Key
 from sprag_study.service.reading.faults import allowed_text, fault_text
-from sprag_study.service.reading.units import parse_quantity
 from sprag_study.service.spec.components import read_components
 from sprag_study.service.spec.document import format_of, load_spec, parse_spec
 from sprag_study.service.spec.measured import MeasuredDataError, parse_measured
@@ -130,7 +129,7 @@ def test_a_component_and_measured_data() -> None:
     (fault,) = refused.value.faults
     assert fault_text(fault).startswith("line 2, column spring_rate: is in 'N', which is not a unit of this field")
     with pytest.raises(MeasuredDataError) as unread:
-        parse_measured("angle [kg],M [N*m]\n1,2", parse_quantity)
+        parse_measured("angle [kg],M [N*m]\n1,2")
     (column,) = unread.value.faults
     assert fault_text(column).startswith("column angle: is in 'kg', which is not a unit of this field; expected rad")
     with language("uk"):

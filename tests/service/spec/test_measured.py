@@ -5,18 +5,17 @@ import math
 import numpy as np
 import pytest
 
-from sprag_study.service.reading.units import parse_quantity
 from sprag_study.service.spec.measured import MeasuredDataError, parse_measured
 
 
 def rows(text: str) -> list[list[float]]:
-    return parse_measured(text, parse_quantity).rows.tolist()
+    return parse_measured(text).rows.tolist()
 
 
 def problems(text: str) -> list[tuple[str | None, str]]:
     """Place and code of everything wrong with the data."""
     with pytest.raises(MeasuredDataError) as caught:
-        parse_measured(text, parse_quantity)
+        parse_measured(text)
     return [(fault.where, fault.code) for fault in caught.value.faults]
 
 
@@ -50,7 +49,7 @@ def test_degrees_become_radians() -> None:
 
 
 def test_rows_know_their_lines() -> None:
-    measured = parse_measured("# bench\nangle,torque\n0.01,2\n\n0.02,4\n", parse_quantity)
+    measured = parse_measured("# bench\nangle,torque\n0.01,2\n\n0.02,4\n")
     assert measured.lines == (3, 5)
 
 
@@ -63,14 +62,14 @@ def test_a_header_that_is_not_understood_is_refused(header: str) -> None:
     ("header", "assumed"), [("", ["rad", "N*m"]), ("Angle,torque_Nm\n", ["rad"]), ("angle_rad,torque_Nm\n", [])]
 )
 def test_units_that_are_assumed_are_told(header: str, assumed: list[str]) -> None:
-    warnings = parse_measured(f"{header}0.01,2.5\n0.02,5.25\n", parse_quantity).warnings
+    warnings = parse_measured(f"{header}0.01,2.5\n0.02,5.25\n").warnings
     assert [warning.code for warning in warnings] == ["assumed-units"] * bool(assumed)
     assert all(f" in {unit}" in warnings[0] for unit in assumed)
 
 
 def test_angles_that_are_rather_degrees_are_told() -> None:
-    assert parse_measured("1,2\n3,4\n", parse_quantity).warnings[1].code == "implausible-value"
-    assert parse_measured("angle_rad,torque_Nm\n1,2\n3,4\n", parse_quantity).warnings == ()
+    assert parse_measured("1,2\n3,4\n").warnings[1].code == "implausible-value"
+    assert parse_measured("angle_rad,torque_Nm\n1,2\n3,4\n").warnings == ()
 
 
 def test_every_wrong_row_is_told_with_its_line() -> None:
@@ -105,3 +104,10 @@ def test_numbers_have_the_minus_sign_of_a_typesetter() -> None:
         [-0.01, -2.5],
         [0.02, 5.25],
     ]
+
+
+def test_the_same_text_is_read_once() -> None:
+    first = parse_measured("angle_deg,torque_Nmm\n1,2\n")
+    assert parse_measured("angle_deg,torque_Nmm\n1,2\n") is first
+    with pytest.raises(ValueError, match="read-only"):
+        first.rows[0, 0] = 1.0

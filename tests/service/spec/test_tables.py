@@ -11,7 +11,6 @@ import pytest
 from sprag_study.service.faults import Fault
 from sprag_study.service.http.web.form.columns import COLUMNS, take_columns
 from sprag_study.service.http.web.form.fields import Choice
-from sprag_study.service.reading.units import parse_quantity
 from sprag_study.service.spec.components import list_text, read_components
 from sprag_study.service.spec.document import parse_spec
 from sprag_study.service.spec.measured import MeasuredDataError, parse_measured
@@ -102,10 +101,10 @@ def test_a_table_of_texts_in_a_list_is_settled() -> None:
 
 def test_clutch_data_are_settled_like_any_table() -> None:
     text = "angle [mrad];torque [N*mm]\n10;2.500\n20,5;5.250\n"
-    assert parse_measured(text, parse_quantity).rows.tolist() == [[0.010, 2.5], [0.0205, 5.25]]
+    assert parse_measured(text).rows.tolist() == [[0.010, 2.5], [0.0205, 5.25]]
     for sign in (";", "\t", " "):
         with pytest.raises(MeasuredDataError) as caught:
-            parse_measured(text.replace("20,5", "20").replace(";", sign), parse_quantity)
+            parse_measured(text.replace("20,5", "20").replace(";", sign))
         assert [fault.code for fault in caught.value.faults] == ["ambiguous-point"]
     data = [["10 mrad", "2.500 N*mm"], ["20,5 mrad", "5.250 N*mm"], ["30 mrad", "8.000 N*mm"]]
     clutch = {"/base/clutch": {"data": data, "accuracy": 1, "max_degree": 1}, "/axes": []}
@@ -208,7 +207,7 @@ def test_a_recording_may_begin_before_the_angle_0() -> None:
 )
 def test_clutch_data_are_read_likewise(text: str) -> None:
     expected = [[math.radians(angle), torque] for angle, torque in ((0.25, 0.878), (0.5, 1.79), (1.5, 6.2))]
-    np.testing.assert_allclose(parse_measured(text, parse_quantity).rows, expected, rtol=1e-15)
+    np.testing.assert_allclose(parse_measured(text).rows, expected, rtol=1e-15)
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,6 @@ from sprag_study.service.reading.faults import message
 from sprag_study.service.reading.numbers import assumption, in_language, settle, settled
 from sprag_study.service.reading.quantities import TYPED
 from sprag_study.service.reading.reader import CLUTCH, Choice, Reading, reading_for
-from sprag_study.service.reading.units import parse_quantity
 from sprag_study.service.reading.wording import duration
 from sprag_study.service.results.draft_words import draft_words
 from sprag_study.service.schedules.deadline import ALLOWED, FinishError, finish_at
@@ -217,7 +216,7 @@ def _typed_together(values: Mapping[str, str]) -> Iterator[tuple[str, list[str],
 def _assumed(text: str) -> list[str]:
     """Assumptions about pasted data; none for data that cannot be read, which is reported elsewhere."""
     try:
-        notes = parse_measured(text, parse_quantity).warnings
+        notes = parse_measured(text).warnings
     except MeasuredDataError:
         return []
     return [_("Measured data: {text}.", text=CLUTCH.warning(note).removesuffix(".")) for note in notes]

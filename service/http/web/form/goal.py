@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
@@ -15,6 +14,7 @@ from sprag_study.service.reading.numbers import in_language, parse_number
 from sprag_study.service.reading.together import with_last_unit
 from sprag_study.service.reading.units import exact_quantity
 from sprag_study.worker import models
+from sprag_study.worker.models.parameters import general_path
 
 if TYPE_CHECKING:
     from sprag_study.service.reading.reader import Reading
@@ -51,6 +51,6 @@ def _limits(values: Mapping[str, str]) -> Iterator[tuple[str, str]]:
     units = {entry.name: entry.unit for entry in models.result_catalogue(model_name(values)) if entry.kind == "real"}
     for index in range(count_of(values, "subject_to")):
         row = f"{PARTS['subject_to'].pointer}/{index}"
-        name = re.sub(r"\.\d+\.", ".N.", values.get(f"{row}/result", ""))
+        name = general_path(values.get(f"{row}/result", ""))
         if name in units:
             yield row, units[name]

@@ -151,7 +151,7 @@ def _measured(name: str, text: str, faults: Faults) -> list[list[float]] | None:
     if not text.strip():
         return None
     try:
-        rows: list[list[float]] = parse_measured(text, parse_quantity).rows.tolist()
+        rows: list[list[float]] = parse_measured(text).rows.tolist()
     except MeasuredDataError as error:
         faults[name] = [_fault_text(fault) for fault in error.faults]
         return None

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from sprag_study.service.reading.units import parse_quantity
 from sprag_study.service.spec.document import parse_spec
 from sprag_study.service.spec.draws.unit import LEVELS, unit_sample
 from sprag_study.service.spec.measured import MeasuredDataError, parse_measured
@@ -161,7 +160,7 @@ def test_what_only_python_takes_for_a_number_is_none(cell: str) -> None:
     assert problem.message.startswith("line 3, column excitation.frequency: ")
     assert problem.value == cell
     with pytest.raises(MeasuredDataError, match="number"):
-        parse_measured(f"angle_rad,torque_Nm\n0.1,2\n{cell},3\n", parse_quantity)
+        parse_measured(f"angle_rad,torque_Nm\n0.1,2\n{cell},3\n")
 
 
 @pytest.mark.parametrize(
