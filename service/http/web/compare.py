@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
@@ -99,15 +100,9 @@ def _page(
     context: Context, given: QueryParams, records: list[StudyRecord], answer: Answer, faults: Sequence[Fault]
 ) -> Response:
     chosen: Comparison | None = None
-    held: list[tuple[str, ...]] = []
-    if records and not faults:
-        chosen = comparison(context.store, given, records) if answer.figure else None
-        held = chosen.held() if chosen is not None else []
-    elif records and not _nothing_in_common(faults):  # the choices are there to be mended
-        try:
+    if records and not _nothing_in_common(faults):  # with other faults, the choices are there to be mended
+        with suppress(SelectionError):
             chosen = comparison(context.store, given, records)
-        except SelectionError:
-            chosen = None
     choice = current().choice
     reading = reading_of(context.store, records[0].id, choice) if records else None
     query = "" if chosen is None else urlencode([*chosen.pairs(), *address_pairs(choice)])
@@ -129,7 +124,6 @@ def _page(
         faults=faults,
         note=f"{upper_first(fault_text(faults[0]))}." if _nothing_in_common(faults) else "",
         units={} if chosen is None else {path: unit_of(chosen.studies[0], path) for path in chosen.axes},
-        held=[] if reading is None or not held else _held(held, answer.names, reading),
         fixed=[] if chosen is None or reading is None else _fixed(chosen, reading),
         values=[] if chosen is None or faults else _values(chosen),
         query=query,
@@ -139,14 +133,6 @@ def _page(
 
 def _nothing_in_common(faults: Sequence[Fault]) -> bool:
     return bool(faults) and all(fault.code == "nothing-in-common" for fault in faults)
-
-
-def _held(held: Sequence[tuple[str, ...]], names: Sequence[str], reading: Reading) -> list[tuple[str, str]]:
-    """What is held, by the name of its study; by "" where that is the same in all."""
-    said = [", ".join(map(reading.say, texts)) for texts in held]
-    if len(set(said)) == 1:
-        return [("", said[0])] if said[0] else []
-    return [(name, text) for name, text in zip(names, said, strict=True) if text]
 
 
 def _offered(context: Context, given: QueryParams, *, choosing: bool) -> dict[str, Any]:

@@ -76,6 +76,7 @@ class Answer:
     each : of studies that ask different things, the answer of each
     rows : the numbers of their headlines
     figure, title : the chart, empty for none; ``left`` says what has no curve there
+    held : what is held in it, by the name of its study; by "" where that is the same in all
     faults : why there is no chart
     """
 
@@ -86,6 +87,7 @@ class Answer:
     figure: Markup = EMPTY
     title: str = ""
     left: str = ""
+    held: Sequence[tuple[str, str]] = ()
     faults: tuple[Fault, ...] = ()
 
 
@@ -127,7 +129,15 @@ def answer_of(library: Library, given: Sequence[tuple[str, str]], choice: Choice
     kept, left = charted(chosen, curves)
     title = _title(chosen, reading)
     figure = drawn_figure(read_figure(curves_figure(kept, 2, apart=told_apart_by(studies)), reading), title)
-    return answer(figure, title, _left(left, reading))
+    return answer(figure, title, _left(left, reading), _held(chosen.held(), names, reading))
+
+
+def _held(held: Sequence[tuple[str, ...]], names: Sequence[str], reading: Reading) -> list[tuple[str, str]]:
+    """What is held, as of `Answer`."""
+    said = [", ".join(map(reading.say, texts)) for texts in held]
+    if len(set(said)) == 1:
+        return [("", said[0])] if said[0] else []
+    return [(name, text) for name, text in zip(names, said, strict=True) if text]
 
 
 def _headlines(
