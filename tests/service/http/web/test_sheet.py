@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Final
 
 import pytest
@@ -56,6 +57,13 @@ WORDS: Final = r"""() => {
 def test_the_unit_of_a_field(texts: list[str], si: str, choice: str, shown: tuple[tuple[str, ...], str]) -> None:
     found = quantity_of(texts, si, preferred(choice, "vibration-drive"))
     assert (found.texts, found.unit) == shown
+
+
+def test_a_unit_says_that_it_leaves_the_number(service: Service) -> None:
+    page = service.http.get("/new?preset=one_pendulum").text
+    units = re.findall(r'<select name="unit:[^>]*>', page)
+    assert units
+    assert all('data-help="Another unit leaves the number as it is."' in one for one in units)
 
 
 def test_a_row_has_one_unit() -> None:

@@ -149,7 +149,7 @@ def test_axe_finds_nothing_with_every_drawer_open(page: Page, kinds: dict[str, s
 
 def test_the_working_point_tells_its_case_or_both_neighbours(page: Page, kinds: dict[str, str]) -> None:
     page.goto(f"/studies/{kinds['grid']}")
-    slider = page.locator("input[name=point]")
+    slider = page.locator("input[data-cases]")
     slider.evaluate("(field) => { field.value = 0.299; field.dispatchEvent(new Event('input', { bubbles: true })); }")
     expect(page.locator("#say")).to_have_text(re.compile(r"^At 0\.3 N·m it runs at [\d.]+ \S+ with .*efficiency\.$"))
     expect(slider).to_have_value("0.3")
@@ -170,6 +170,21 @@ def test_the_working_point_tells_its_case_or_both_neighbours(page: Page, kinds: 
     expect(page.locator("h1")).to_have_text("As drawn, 0.25 N·m")
 
 
+def test_the_working_point_is_typed_as_a_number(page: Page, kinds: dict[str, str]) -> None:
+    page.goto(f"/studies/{kinds['grid']}")
+    number, slider = page.get_by_role("spinbutton", name="Load torque (N·m)"), page.locator("input[data-cases]")
+    number.fill("0.2187")
+    expect(page.locator("#say")).to_contain_text("No case was run at 0.2187 N·m. At 0.2 N·m")
+    expect(slider).to_have_value("0.2187")
+    number.press("Enter")
+    expect(page).to_have_url(re.compile(r"point=0\.2187"))
+    number.press("ArrowUp")
+    expect(number).to_have_value("0.3")
+    expect(page).to_have_url(re.compile(r"point=0\.3"))
+    slider.press("Home")
+    expect(number).to_have_value("0")
+
+
 @pytest.mark.parametrize("page", [{"java_script_enabled": False}], indirect=True)
 def test_without_scripts_it_is_a_plain_form(page: Page, service: Service, kinds: dict[str, str]) -> None:
     page.goto(f"/studies/{kinds['grid']}")
@@ -183,12 +198,15 @@ def test_without_scripts_it_is_a_plain_form(page: Page, service: Service, kinds:
     page.get_by_role("button", name="Draw").click()
     expect(page).to_have_url(re.compile("x=shaft.load"))
     assert page.locator(".say").is_visible()
+    page.get_by_role("spinbutton", name="Load torque (N·m)").fill("0.2")
+    page.get_by_role("button", name="Show").click()
+    expect(page.locator("#say")).to_contain_text("At 0.2 N·m")
 
 
 def test_arrows_go_from_case_to_case_and_the_slider_stands_between_them(page: Page, service: Service) -> None:
     loads = {"axes": [{"path": "shaft.load", "values": [0, 0.1, 0.2, 0.3, 1.6]}]}
     page.goto(f"/studies/{run(service, {**PLAIN, 'name': 'Wide', **loads})}?point=0.1")
-    slider = page.locator("input[name=point]")
+    slider = page.locator("input[data-cases]")
     slider.focus()
     for key, value in (("ArrowRight", "0.2"), ("ArrowUp", "0.3"), ("ArrowLeft", "0.2"), ("End", "1.6")):
         slider.press(key)
@@ -220,7 +238,7 @@ def test_with_its_end_a_study_that_is_looked_at_has_all_that_an_ended_one_has(pa
         expect(page.get_by_text(text, exact=True)).to_have_count(0)
     expect(page.get_by_role("link", name="How does it move?")).to_be_visible()
     expect(page.locator("#labels [name=notes]")).to_have_value("half a no")
-    slider = page.locator("input[name=point]")
+    slider = page.locator("input[data-cases]")
     slider.press("End")
     expect(page.locator("#say")).to_contain_text("At 0.3 N·m")
     expect(page).to_have_url(re.compile(r"point=0\.3"))

@@ -97,7 +97,7 @@ def test_the_working_point_and_the_date_of_the_report_are_as_written(service: Se
     page = service.http.get(f"{address}&point=150.5+N*mm", headers=UKRAINIAN).text
     told = page.partition('id="say"')[2].partition("</p>")[0]
     assert "При 0,1505 Н·м випадку не обчислено. При 0,1 Н·м вал обертається" in told
-    assert re.search(r'name="point" min="0\.02" max="0\.3" step="any" value="0\.1505"', page)
+    assert re.search(r'class="script" min="0\.02" max="0\.3" step="any" value="0\.1505"', page)
     typed = service.http.get(f"{address}&point=0,15+Н·м", headers={"Accept-Language": "en"}).text
     assert "No case was run at 0.15 N·m." in typed
     report = service.http.get(f"/studies/{study_id}/document", headers=UKRAINIAN).text
