@@ -89,7 +89,8 @@ def shots(ids: list[str]) -> list[tuple[str, str, tuple[int, int], bool]]:
 
 def take(page: Page, name: str, whole: bool) -> bytes:
     """The picture of a page, once everything on it is drawn."""
-    page.wait_for_function("() => [...document.querySelectorAll('.plot')].every(plot => plot.dataset.drawn)")
+    page.wait_for_load_state("networkidle")
+    page.wait_for_function("() => !document.querySelector('[aria-busy], .stale, [data-later]')")
     target = page.locator("fieldset:has(> .clutch)") if name == "new-fit" else page
     options = {} if name == "new-fit" else {"full_page": whole}
     shot = Image.open(io.BytesIO(target.screenshot(animations="disabled", **options)))

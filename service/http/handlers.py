@@ -16,7 +16,7 @@ from starlette.responses import Response
 from sprag_study.sentences import Sentence, Whole, joined, whole
 from sprag_study.service.faults import FaultError, Kind, parameter_error, shown
 from sprag_study.service.http.problems import PROBLEM_TYPES, ApiError, api_error, problem_response
-from sprag_study.service.http.web.problem_page import problem_page
+from sprag_study.service.http.web.problem_page import problem_page, wants_page
 from sprag_study.service.storage.errors import PageTokenError, StoreError
 from sprag_study.service.views.queries import parameter_fault
 from sprag_study.worker.states import TransitionError
@@ -66,7 +66,8 @@ def _unknown(request: Request, error: Exception) -> Response:
 
 def _http(request: Request, error: Exception) -> Response:
     raised = cast("HTTPException", error)
-    if raised.status_code == 404:
+    only_sent_to = raised.status_code == 405 and request.method == "GET" and wants_page(request)
+    if raised.status_code == 404 or only_sent_to:  # what forms are sent to is no page
         return _answer(
             request, ApiError("not-found", Sentence("There is nothing at {address}.", address=shown(request.url.path)))
         )

@@ -76,7 +76,12 @@ _HOW: Final = {
     "tolerances": N_("This study has no tolerances. Give a copy of it some: then many drives are drawn and run."),
 }
 #: Addresses of these answers as pages of their own, whose names saved views have.
-OLD: Final = {"sensitivity": "sensitivity", "drives": "tolerances", "calibration": "measurement"}
+OLD: Final = {
+    "sensitivity": "sensitivity",
+    "drives": "tolerances",
+    "calibration": "measurement",
+    **dict.fromkeys(("ribbon", "tolerances", "yield"), "tolerances"),
+}
 
 
 def seen(

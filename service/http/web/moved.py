@@ -31,9 +31,6 @@ OF_STUDY: Final = {
     "designs": "rows",
     "report": "document",
     "reports": "document",
-    "ribbon": "matters",
-    "tolerances": "matters",
-    "yield": "matters",
 }
 #: Pages that a case had, all on its own now.
 OF_CASE: Final = ("motion", "strobes", "trajectory")

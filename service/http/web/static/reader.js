@@ -8,7 +8,9 @@
   // `zone` is that of the times on the page, and empty where somebody chose one.
   if (zone && own && own !== zone) {
     document.cookie = `sprag_here=${encodeURIComponent(own)}; path=${sprag.prefix || "/"}; max-age=31536000; samesite=lax`;
-    if (document.querySelector("time") && document.cookie.includes("sprag_here=")) sprag.page(location.href).then((page) => {
+    const known = document.cookie.includes("sprag_here="), named = document.getElementById("times");
+    if (known && named) named.textContent = named.textContent.replace(zone, own);
+    if (known && document.querySelector("time")) sprag.page(location.href).then((page) => {
       const times = page.querySelectorAll("time");
       document.querySelectorAll("time").forEach((time, place) => { if (times[place]) time.replaceWith(times[place].cloneNode(true)); });
     }).catch(() => {});

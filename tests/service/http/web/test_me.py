@@ -159,6 +159,7 @@ def test_times_are_in_the_zone_of_the_browser_or_in_the_chosen_one(
     time = page.locator("#studies time").first
     # The first page is made for the office; its times follow when the browser has said its own zone.
     expect(time).to_have_attribute("title", re.compile("Asia/Tokyo"))
+    expect(page.get_by_text("Times: Asia/Tokyo")).to_be_visible()
     page.goto("/me")
     expect(page.get_by_text("Times: Asia/Tokyo")).to_be_visible()
     page.get_by_label("Times on pages are those of").select_option("Europe/Kyiv")

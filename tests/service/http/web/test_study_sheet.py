@@ -320,6 +320,13 @@ def test_a_question_that_is_not_answered_yet_begins_a_study_that_asks_it(page: P
     expect(page.locator("#batch")).to_be_checked()
 
 
+def test_an_unknown_address_of_a_study_is_a_page_that_says_so(service: Service, kinds: dict[str, str]) -> None:
+    browser = {"Accept": "text/html"}
+    for address in ("nonsense", "cancel", "cases/1/nonsense"):
+        answer = service.http.get(f"/studies/{kinds['grid']}/{address}", headers=browser)
+        assert (answer.status_code, "There is nothing at" in answer.text) == (404, True), address
+
+
 def test_former_addresses_keep_their_choices(service: Service, kinds: dict[str, str]) -> None:
     own = f"/studies/{kinds['grid']}"
     for former, now in (

@@ -145,6 +145,7 @@ def test_old_addresses_of_views_lead_to_them_with_their_choices(service: Service
         old = service.http.get(f"{own}/{part}?along=shaft.load&from=0.2", follow_redirects=False)
         assert old.status_code == 308
         assert old.headers["location"] == f"{own}?show={part}&along=shaft.load&from=0.2"
+    assert {name for name, ask in OLD.items() if ask == "tolerances"} == {"drives", "ribbon", "tolerances", "yield"}
     for name, ask in OLD.items():
         old = service.http.get(f"/studies/{study_id}/{name}?y=efficiency&ask=old", follow_redirects=False)
         assert (old.status_code, old.headers["location"]) == (
