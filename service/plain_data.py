@@ -54,6 +54,10 @@ class _Reader:
         kind = type(data)
         if hasattr(kind, "magnitude") and hasattr(kind, "units"):
             return self._quantity(data, pointer, depth)
+        if hasattr(kind, "dims") and hasattr(kind, "data"):  # an array of xarray, with the unit of its attributes
+            unit = str(data.attrs.get("units", ""))
+            values = self.read(data.data, pointer, depth + 1)
+            return values if values is None or unit in ("", "1") else _with_unit(values, unit)
         listed = getattr(kind, "tolist", getattr(kind, "to_list", None))
         # Other libraries of units give their lists without the units.
         if listed is None or hasattr(kind, "unit") or hasattr(kind, "units"):
@@ -103,7 +107,9 @@ class _Reader:
 
 
 def _with_unit(number: Any, unit: str) -> Any:
-    return [_with_unit(item, unit) for item in number] if isinstance(number, list) else f"{number!r} {unit}"
+    if isinstance(number, list):
+        return [_with_unit(item, unit) for item in number]
+    return number if isinstance(number, str) or number is None else f"{number!r} {unit}"
 
 
 def _escaped(key: object) -> str:

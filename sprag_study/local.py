@@ -163,6 +163,7 @@ def _restored(content: bytes, study_id: str) -> LocalStudy:
 def run(
     spec: Spec | str | PathLike[str],
     *,
+    cases: object = None,
     processes: int | None = None,
     database: str | None = None,
     fresh: bool = False,
@@ -175,8 +176,11 @@ def run(
     ----------
     spec : mapping, str or path
         A spec, the name of a JSON or TOML file with one, or the name of a study that comes with Sprag. Values may be
-        numbers of numpy and decimal, arrays, columns of pandas and quantities of pint, and ``axes`` a pandas table with
-        a column for each parameter and a row for each case.
+        numbers of numpy and decimal, arrays, columns of pandas and quantities of pint.
+    cases : table, optional
+        The cases in place of those of the spec: a frame of pandas or polars, a dataset of xarray, a mapping of columns
+        or a sequence of mappings, with a column for each parameter, such as "shaft.load", and a row for each case.
+        Numbers are in the units of ``attrs["units"]``, by default SI.
     processes : int, optional
         Number of processes; 0 runs the cases in this process. By default one per core, or 0 where the study takes about
         a second. A script that starts processes needs ``if __name__ == "__main__":`` around its own code.
@@ -202,7 +206,7 @@ def run(
     StoreError, ExecutorError
         When the database or a process fails. All of them are a SpragError.
     """
-    data, faults = plain(spec_of(spec))
+    data, faults = plain(spec_of(spec, cases))
     if faults:
         raise SpecError(faults)
     parsed = parse_spec(data)

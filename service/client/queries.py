@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Iterator, KeysView, Mapping, Sequence, Set, ValuesView
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Final, cast
 
+from sprag_study.service.client.case_tables import points_of
 from sprag_study.service.client.errors import ArgumentError, SpecFileError
 from sprag_study.service.plain_data import plain
 from sprag_study.service.presets import preset_names, preset_text
@@ -22,16 +21,25 @@ Ends = tuple[Value, Value]
 #: Paths of axes and their values.
 Held = Mapping[str, Value | Sequence[Value]]
 Spec = Mapping[str, Any]
+#: Fields of a spec that say which cases it has.
+DESIGN_FIELDS: Final = ("axes", "combine", "exclude")
 
 
-def spec_of(spec: Spec | str | PathLike[str]) -> Spec:
+def spec_of(spec: Spec | str | PathLike[str], cases: object = None) -> Spec:
     """A spec given as data, as the name of a JSON or TOML file, or as that of a preset; SpecFileError about the file.
 
-    ``axes`` of data can be a table of pandas or polars: a column for each parameter, a row for each case.
+    ``cases`` is a table of cases (`points_of`) in place of what varies in the spec, whose ``axes`` can be one, too.
     """
-    if isinstance(spec, Mapping):
-        axes: Any = spec.get("axes")
-        return {**spec, "axes": [{"points": _csv(axes)}]} if hasattr(axes, "columns") else spec
+    given = dict(spec) if isinstance(spec, Mapping) else _named_spec(spec)
+    axes = given.get("axes")
+    if cases is not None:
+        kept = {name: part for name, part in given.items() if name not in DESIGN_FIELDS}
+        return {**kept, "axes": [{"points": points_of(cases, "cases")}]}
+    return {**given, "axes": [{"points": points_of(axes, "axes")}]} if hasattr(axes, "columns") else given
+
+
+def _named_spec(spec: str | PathLike[str]) -> dict[str, Any]:
+    """The spec of a file or a preset."""
     path = Path(spec)
     if str(spec) in preset_names() and not path.exists():
         return preset(str(spec))
@@ -41,24 +49,6 @@ def spec_of(spec: Spec | str | PathLike[str]) -> Spec:
         reason = getattr(error, "strerror", None) or error
         raise SpecFileError(f"cannot read a spec from the file {str(path)!r}: {reason}") from error
     return _read(path, text)
-
-
-def _csv(table: Any) -> str:
-    """The text of a CSV file of a table of cases; ArgumentError where a cell has no value."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(table.columns)
-    writer.writerows(zip(*(_cells(name, table[name]) for name in table.columns), strict=True))
-    return text.getvalue()
-
-
-def _cells(name: str, column: Any) -> list[Any]:
-    """The values of a column of a table of cases."""
-    values, faults = plain(column)
-    if not isinstance(values, list) or faults or None in values:
-        row = next((index for index, value in enumerate(values) if value is None), 0) if isinstance(values, list) else 0
-        raise ArgumentError(f"axes[{name!r}]", list(column)[row], "a number, or a text with a unit, in every row")
-    return values
 
 
 def preset(name: str) -> dict[str, Any]:

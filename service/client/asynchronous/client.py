@@ -40,29 +40,46 @@ class AsyncClient(AsyncConnection):
     async def __aenter__(self) -> AsyncClient:
         return self
 
-    async def preview(self, spec: Spec | str | PathLike[str], *, finish_by: str | datetime | None = None) -> Preview:
-        """Preview of a study: cases, how many of them can be reused, time, size, warnings."""
+    async def preview(
+        self, spec: Spec | str | PathLike[str], *, cases: object = None, finish_by: str | datetime | None = None
+    ) -> Preview:
+        """Preview of a study as `submit` takes it: cases, how many of them can be reused, time, size, warnings."""
         query = query_of({"finish_by": None if finish_by is None else finish_text(finish_by)})
-        return cast("Preview", await self.request("POST", "/studies:preview", json=spec_of(spec), params=query))
+        return cast("Preview", await self.request("POST", "/studies:preview", json=spec_of(spec, cases), params=query))
 
     async def submit(
         self,
         spec: Spec | str | PathLike[str],
         *,
+        cases: object = None,
         key: str | None = None,
         priority: int = 0,
         fresh: bool = False,
         finish_by: str | datetime | None = None,
     ) -> AsyncStudy:
-        """Submit a study: a spec, or the name of a JSON or TOML file with one.
+        """Submit a study.
 
-        The same ``key`` submits it once, however often it is sent. A ``fresh`` study runs every case, even those that
-        other studies have. With ``finish_by``, an aware time or a duration such as "8 h", it is run coarse to fine and
-        held then.
+        Parameters
+        ----------
+        spec : mapping, str or path
+            A spec, the name of a JSON or TOML file with one, or the name of a study that comes with Sprag. Values may
+            be numbers of numpy and decimal, arrays, columns of pandas, and quantities of pint.
+        cases : table, optional
+            The cases in place of those of the spec: a frame of pandas or polars, a dataset of xarray, a mapping of
+            columns or a sequence of mappings, with a column for each parameter, such as "shaft.load", and a row for
+            each case. Numbers are in the units of ``attrs["units"]``, by default SI.
+        key : str, optional
+            The same key submits the study once, however often it is sent.
+        priority : int
+            Among the waiting studies of a user the one of the highest priority runs first.
+        fresh : bool
+            Run every case, even those that other studies have.
+        finish_by : datetime or str, optional
+            An aware time, or a duration such as "8 h": the study is run coarse to fine and held then.
         """
         finish = None if finish_by is None else finish_text(finish_by)
         query = query_of({"priority": priority or None, "fresh": fresh, "finish_by": finish})
-        made = await self.request("POST", "/studies", key=key or "", json=spec_of(spec), params=query)
+        made = await self.request("POST", "/studies", key=key or "", json=spec_of(spec, cases), params=query)
         return AsyncStudy(self, made["id"])
 
     async def study(self, study_id: str) -> AsyncStudy:
