@@ -64,20 +64,16 @@ def submit(address: str) -> list[str]:
 def shots(ids: list[str]) -> list[tuple[str, str, tuple[int, int], bool]]:
     """Name, address, window and whether the whole page is shown."""
     one, two, fitted = ids
+    mapped = f"/studies/{one}?x=shaft.load&up=excitation.frequency"
     return [
         ("studies", "/", DESKTOP, True),
         ("new", "/new?preset=one_pendulum", (1280, 1060), False),
         ("new-fit", f"/new?clone={fitted}", (1280, 1000), False),
         ("study", f"/studies/{one}", (1280, 1150), False),
         ("study-tablet", f"/studies/{two}", TABLET, False),
-        ("curves", f"/studies/{one}/curves?x=shaft.load&by=excitation.amplitude_x&y=shaft.speed.mean", DESKTOP, True),
-        (
-            "map",
-            f"/studies/{one}/map?x=shaft.load&y=excitation.frequency&z=power.useful.mean&kind=contour",
-            DESKTOP,
-            True,
-        ),
-        ("map-order", f"/studies/{one}/map?x=shaft.load&y=excitation.frequency&z=regime.order", DESKTOP, True),
+        ("curves", f"/studies/{one}?x=shaft.load&by=excitation.amplitude_x&y=shaft.speed.mean", DESKTOP, False),
+        ("map", f"{mapped}&z=power.useful.mean&kind=contour", DESKTOP, False),
+        ("map-order", f"{mapped}&z=regime.order", DESKTOP, False),
         ("explore", f"/studies/{one}/rows?max:shaft.load=0.15&sort=-efficiency", (1280, 1150), False),
         ("case", f"/studies/{two}/cases/45", DESKTOP, True),
         ("laboratory", "/new?model=machine-shaft&machine=press", (1280, 1000), False),
@@ -91,7 +87,9 @@ def take(page: Page, name: str, whole: bool) -> bytes:
     """The picture of a page, once everything on it is drawn."""
     page.wait_for_load_state("networkidle")
     page.wait_for_function("() => !document.querySelector('[aria-busy], .stale, [data-later]')")
-    target = page.locator("fieldset:has(> .clutch)") if name == "new-fit" else page
+    if name == "new-fit":
+        page.locator("details:has(.clutch)").evaluate_all("(all) => all.forEach((one) => { one.open = true; })")
+    target = page.locator("div.clutch").first if name == "new-fit" else page
     options = {} if name == "new-fit" else {"full_page": whole}
     shot = Image.open(io.BytesIO(target.screenshot(animations="disabled", **options)))
     packed = io.BytesIO()

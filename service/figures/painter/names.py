@@ -70,21 +70,29 @@ def named_curves(
     """
     if not curves or len(curves) > MOST_NAMED or any(text_width(name, SMALL) > _WIDEST for name, _, _ in curves):
         return None
-    dense = [_dense(x, y) for _, x, y in curves]
-    if any(own.shape[0] == 0 for own in dense):
+    dots = [dense(x, y) for _, x, y in curves]
+    if any(own.shape[0] == 0 for own in dots):
         return None
-    rest = [_dense(x, y) for x, y in others]
+    rest = [dense(x, y) for x, y in others]
     boxes, found = list(taken), list[Named | None]([None] * len(curves))
     # The curves with the fewest points have the fewest places.
-    for index in sorted(range(len(curves)), key=lambda place: dense[place].shape[0]):
+    for index in sorted(range(len(curves)), key=lambda place: dots[place].shape[0]):
         name = curves[index][0]
-        alien = np.concatenate([*(own for place, own in enumerate(dense) if place != index), *rest, np.empty((0, 2))])
-        best = _best(name, dense[index], alien, boxes, size, bold=index == chosen)
+        alien = np.concatenate([*(own for place, own in enumerate(dots) if place != index), *rest, np.empty((0, 2))])
+        best = _best(name, dots[index], alien, boxes, size, bold=index == chosen)
         if best is None:
             return None
         found[index] = Named(name, best.left, best.bottom - 2.0, index == chosen)
         boxes.append(best)
     return [one for one in found if one is not None]
+
+
+def clearest(places: Sequence[Box], lines: Sequence[Numbers], taken: Sequence[Box]) -> Box:
+    """The first place that touches neither a line (by its points) nor what is taken; the freest where none does."""
+    free = [box for box in places if not any(box.touches(other) for other in taken)] or [places[-1]]
+    points = np.concatenate([*lines, np.empty((0, 2))])
+    clear = [distance(box, points) for box in free]
+    return next((box for box, far in zip(free, clear, strict=True) if far >= _NEAR), free[int(np.argmax(clear))])
 
 
 def _best(
@@ -93,10 +101,10 @@ def _best(
     """The place of a name that is farthest from other curves; of equal ones the first."""
     best, clear = None, _NEAR
     for box in _places(text_width(name, SMALL, bold=bold), own, size):
-        near = _distance(box, own)
+        near = distance(box, own)
         if near < _NEAR - 1.0 or any(box.touches(other) for other in boxes):
             continue
-        free = min(_distance(box, alien), _FAR)
+        free = min(distance(box, alien), _FAR)
         # Its own curve is clearly the nearest one.
         if free > max(clear + 0.5, near + _NEAR):
             best, clear = box, free
@@ -118,7 +126,7 @@ def _places(width: float, own: Numbers, size: tuple[float, float]) -> Iterator[B
                     yield box
 
 
-def _distance(box: Box, points: Numbers) -> float:
+def distance(box: Box, points: Numbers) -> float:
     """Pixels from a box to the nearest of some points."""
     if not points.size:
         return _FAR
@@ -128,7 +136,7 @@ def _distance(box: Box, points: Numbers) -> float:
     return float(np.sqrt((across**2 + up**2).min()))
 
 
-def _dense(x: Numbers, y: Numbers) -> Numbers:
+def dense(x: Numbers, y: Numbers) -> Numbers:
     """Points along a curve, a few pixels apart."""
     known = np.isfinite(x) & np.isfinite(y)
     across, up = x[known], y[known]

@@ -23,7 +23,7 @@ from sprag_study.service.figures.painter.elements import (
     text_width,
 )  # fmt: skip
 from sprag_study.service.figures.painter.legends import DASHES, NOTE_MARKERS
-from sprag_study.service.figures.painter.names import Box, Named, named_curves
+from sprag_study.service.figures.painter.names import Box, Named, clearest, dense, named_curves
 from sprag_study.service.figures.painter.scales import Scale, tick_text
 from sprag_study.service.figures.painter.thinning import thin
 from sprag_study.service.languages import gettext
@@ -95,7 +95,7 @@ def colour_beside(line_key: str, colour: str, chosen: str) -> str:
 def panel_parts(placed: Placed) -> tuple[list[str], list[Named]]:
     """What is inside a panel from back to front, and the names that stand at its curves."""
     curves = {index: _drawn(line, placed) for index, line in enumerate(placed.panel.lines)}
-    notes, boxes = _notes(placed)
+    notes, boxes = _notes(placed, [(x, y) for _, x, y in curves.values()])
     named = _names(placed, curves, boxes)
     parts = [*_grid(placed), *_fills(placed), *_bands(placed), *_at(placed)]
     order = sorted(curves, key=lambda index: placed.panel.lines[index].key == placed.chosen != "")
@@ -308,10 +308,11 @@ def _marks(placed: Placed) -> Iterator[str]:
             yield _many(shape, 4.0, x, y, {**look, **more, "data_line": motion_text(marks.regime)})
 
 
-def _notes(placed: Placed) -> tuple[list[str], list[Box]]:
-    """Points that are read off lines with their texts, and the boxes of these."""
+def _notes(placed: Placed, curves: Sequence[tuple[Numbers, Numbers]]) -> tuple[list[str], list[Box]]:
+    """Points that are read off lines with their texts, where no curve runs, and the boxes of these."""
     parts: list[str] = []
     boxes: list[Box] = []
+    lines = [dense(x, y) for x, y in curves] if placed.panel.notes else []
     for note in placed.panel.notes:
         x, y = placed.x.at(note.x), placed.y.at(note.y)
         if not (np.isfinite(x) and np.isfinite(y)):
@@ -320,17 +321,22 @@ def _notes(placed: Placed) -> tuple[list[str], list[Box]]:
         look = {"fill": "none", "stroke": colour, "stroke_width": 2} if ring else {"fill": colour}
         parts.append(_many(NOTE_MARKERS[note.kind], 5.5 if ring else 4.5, np.array([x]), np.array([y]), look))
         if note.text:
-            wide = text_width(note.text, SMALL)
-            left = x - wide - 8.0 if placed.panel.on_the_right(note) else x + 8.0
-            left = min(max(left, 0.0), max(placed.width - wide, 0.0))
-            base = y - 9.0 if y > 22.0 else y + 19.0
-            box = Box(left, base - 11.0, left + wide, base + 3.0)
-            while any(box.touches(other) for other in boxes) and box.bottom < placed.height:
-                base += 15.0
-                box = Box(left, base - 11.0, left + wide, base + 3.0)
+            places = list(_beside(placed, x, y, text_width(note.text, SMALL), placed.panel.on_the_right(note)))
+            box = clearest(places, lines, boxes)
             boxes.append(box)
-            parts.append(halo(note.text, left, base, font_size=SMALL, fill="var(--ink)"))
+            parts.append(halo(note.text, box.left, box.bottom - 3.0, font_size=SMALL, fill="var(--ink)"))
     return parts, boxes
+
+
+def _beside(placed: Placed, x: float, y: float, wide: float, on_the_right: bool) -> Iterator[Box]:
+    """Places for a text at a point: above and below it, on the side with more room first."""
+    room = max(placed.width - wide, 0.0)
+    sides = [min(max(left, 0.0), room) for left in (x + 8.0, x - wide - 8.0)]
+    for away in range(0, 60, 10):
+        for line in (y - 9.0 - away, y + 19.0 + away):
+            base = max(min(line, placed.height - 3.0), 11.0)
+            for left in reversed(sides) if on_the_right else sides:
+                yield Box(left, base - 11.0, left + wide, base + 3.0)
 
 
 def _names(

@@ -10,10 +10,12 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from sprag_study.service.figures.figure import PALETTE, Figure, Fill, Line, Panel, Quantity, line_colours
+from sprag_study.service.figures.figure import PALETTE, Figure, Fill, Line, Note, Panel, Quantity, line_colours
 from sprag_study.service.figures.painter.elements import SMALL, lines_of, text_width
+from sprag_study.service.figures.painter.names import Box, dense, distance
 from sprag_study.service.figures.painter.scales import Scale, rounded_scale, tick_text
 from sprag_study.service.figures.svg import picture_svg, spark, svg
+from sprag_study.service.reading.reader import Phrase
 
 X = np.linspace(0.0, 1.6, 9)
 
@@ -145,3 +147,15 @@ def test_a_logarithmic_axis_has_round_numbers_within_a_decade_too(low: float, hi
     for ticks in (scale.ticks(), scale.rising()):
         assert len(ticks) > 2
         assert all(low <= one <= high and len(tick_text(one).replace("\u202f", "")) <= 4 for one in ticks)
+
+
+def test_a_number_at_a_point_stands_where_no_curve_runs() -> None:
+    x, y = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 1.6]), np.array([0.0, 3.37, 4.57, 3.67, 0.9, 0.0])
+    note = Note(0.1, 3.37, PALETTE[0], "point", Phrase("3.37 W"))
+    panel = Panel(Quantity("power", "W"), (Line("", x, y, PALETTE[0]),), notes=(note,))
+    drawn = svg(Figure(Quantity("load", "N*m"), (panel,)))
+    left, base = map(float, re.findall(r'<text x="([\d.]+)" y="([\d.]+)"[^>]*>3\.37 W<', drawn)[-1])
+    (path,) = re.findall(r'<path d="([^"]+)"[^>]* data-line="power"', drawn)
+    points = np.array(re.findall(r"-?[\d.]+", path), dtype=np.float64).reshape(-1, 2)
+    box = Box(left, base - 11.0, left + text_width("3.37 W", SMALL), base + 3.0)
+    assert distance(box, dense(points[:, 0], points[:, 1])) >= 2.9
