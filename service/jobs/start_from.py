@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from sprag_study.sentences import Sentence
 from sprag_study.service.reading.limits import span
+from sprag_study.service.spec.fields import base_pointer
 from sprag_study.service.spec.machine.drive import START, START_AT
 from sprag_study.service.spec.machine.shaft_check import NotCompiledError, compiles_here
 from sprag_study.service.spec.node import Node
@@ -100,7 +101,7 @@ def _put(report: Report, base: dict[str, Any], path: str, value: float) -> None:
         place = place[key]
     if name in place:
         report.fault(
-            f"/base/{path.replace('.', '/')}", "conflict", Sentence("is given by `{field}`", field=f"base.{START}"),
+            base_pointer(path), "conflict", Sentence("is given by `{field}`", field=f"base.{START}"),
             place[name],
             allowed=Sentence("either it or `{field}`", field=f"base.{START}"),
         )  # fmt: skip

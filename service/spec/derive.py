@@ -145,7 +145,7 @@ def formulas_of(spec: Mapping[str, Any]) -> dict[str, str]:
     return {path: formula.value for path, formula in _read_given(Node(Report(), "", spec)).items()}
 
 
-def with_values(base: object, values: Mapping[str, float | str]) -> Any:
+def with_values(base: object, values: Mapping[str, Any]) -> Any:
     """``base`` with these values at their paths, as far as it has a place for them."""
     filled = copy.deepcopy(base)
     for path, value in values.items():

@@ -1,4 +1,4 @@
-"""Paths with ``*``, and names of studies that follow from others."""
+"""Paths and JSON Pointers, paths with ``*``, and names of studies that follow from others."""
 
 from __future__ import annotations
 
@@ -9,6 +9,16 @@ from sprag_study.worker.limits import MAX_NAME_LENGTH
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+
+def base_path(pointer: str) -> str:
+    """The path of what is at a JSON Pointer of the base: ``/base/shaft/load`` is ``shaft.load``."""
+    return pointer.removeprefix("/base/").replace("/", ".")
+
+
+def base_pointer(path: str) -> str:
+    """JSON Pointer of the entry of the base at a path."""
+    return "/base/" + path.replace(".", "/")
 
 
 def expanded(pattern: str, known: Iterable[str]) -> list[str]:

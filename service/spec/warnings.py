@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from sprag_study.sentences import Amount, Place, Sentence
 from sprag_study.service.spec.axes.axes import varied_values
+from sprag_study.service.spec.fields import base_pointer
 from sprag_study.service.spec.report import Report
 from sprag_study.worker.derived import distinct_values, involved
 from sprag_study.worker.models import machine_shaft
@@ -72,7 +73,7 @@ def warn_machine_shaft(report: Report, study: Study) -> None:
     operation_found = structure.get("balance_side") == "operation"
     for prefix, part in _parts(study):
         if structure["balance"] == "constant" and operation_found and part["operation"]["quantity"] != "none":
-            where = "/base/" + f"{prefix}operation".replace(".", "/")
+            where = base_pointer(f"{prefix}operation")
             report.warn(
                 "replaced-value",
                 where,
@@ -105,7 +106,7 @@ def warn_machine_shaft(report: Report, study: Study) -> None:
     else:
         for prefix, part in _parts(study):
             if part["operation"]["quantity"] == "none" and part["mechanism"]["kind"] == "none":
-                where = "/base/" + prefix.rstrip(".").replace(".", "/")
+                where = base_pointer(prefix.rstrip("."))
                 idle = Sentence("has neither a mechanism nor an operation, so it does nothing")
                 report.warn("nothing-acts", where, idle)
     _shaft_relations(report, study)
@@ -254,7 +255,7 @@ def _place(study: Study, path: str) -> Place:
     for position, axis in enumerate(study.axes):
         if path in axis.paths:
             return Place(f"/axes/{position}", path)
-    return Place("/base/" + path.replace(".", "/"))
+    return Place(base_pointer(path))
 
 
 def _upright(report: Report, study: Study, pendulums: int) -> None:

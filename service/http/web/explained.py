@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from sprag_study.service.spec.fields import base_path
 from sprag_study.worker import models
 
 #: Page and heading by the beginning of a pointer into a spec, without numbers; the machine's own are the model's.
@@ -39,7 +40,7 @@ def explained(pointer: str, model: str) -> str:
     pointer : JSON Pointer of its value in a spec
     """
     if pointer.startswith("/base/"):
-        found = models.model_of(model).presentation.explained(pointer.removeprefix("/base/").replace("/", "."))
+        found = models.model_of(model).presentation.explained(base_path(pointer))
         return found and f"/help/{found}"
     parts = [part for part in pointer.split("/") if part and not part.isdigit()]
     for length in range(len(parts), 0, -1):

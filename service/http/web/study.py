@@ -35,6 +35,7 @@ from sprag_study.service.reading.reader import meanings, reading_for
 from sprag_study.service.results.defaults import no_curves
 from sprag_study.service.results.regimes import DOUBTFUL
 from sprag_study.service.results.shown_inputs import inputs, run_settings, varying
+from sprag_study.service.spec.fields import base_path
 from sprag_study.service.spec.narrow import narrowed_cases
 from sprag_study.service.storage.studies.records import Kinds
 from sprag_study.service.views.headline import is_small
@@ -165,7 +166,7 @@ def _study_page(
         inputs=inputs(study, frame["study"]["spec"], frame["reading"]),
         varying=varying(study, frame["study"]["spec"], frame["reading"]),
         run=run_settings(study, frame["study"]["spec"], frame["reading"]),
-        fits={part_name(pointer.removeprefix("/base/").replace("/", ".")): fit for pointer, fit in fits.items()},
+        fits={part_name(base_path(pointer)): fit for pointer, fit in fits.items()},
         regimes=kinds.regimes,
         regime_meanings=meanings(models.REGIME_SENTENCES),
         flags={flag: count for flag, count in kinds.flags.items() if flag not in models.REGIME_SENTENCES},

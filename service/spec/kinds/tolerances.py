@@ -20,7 +20,7 @@ from sprag_study.service.spec.draws.correlations import CORRELATIONS, read_corre
 from sprag_study.service.spec.draws.described import DISTRIBUTION, FIELDS, read_measured, read_plus_minus
 from sprag_study.service.spec.draws.distributions import Distribution
 from sprag_study.service.spec.draws.unit import correlated, unit_sample
-from sprag_study.service.spec.fields import expanded
+from sprag_study.service.spec.fields import base_pointer, expanded
 from sprag_study.service.spec.kinds.draft import Kind
 from sprag_study.service.spec.node import Node
 from sprag_study.worker.derived import blocks, involved
@@ -259,7 +259,7 @@ def _measured(item: Node, name: str, paths: tuple[str, ...], nominal: list[_Nomi
 
 def _mixed(node: Node, nominal: list[_Nominal]) -> bool:
     """Whether a bare distance stands beside a nominal value in a unit of another scale; it is recorded as a fault."""
-    written = [node.report.written("/base/" + one.parameter.path.replace(".", "/")) for one in nominal]
+    written = [node.report.written(base_pointer(one.parameter.path)) for one in nominal]
     texts = [value for value in written if isinstance(value, str)]
     unit = nominal[0].parameter.unit
     asked = question([node.value, *texts], unit) if not isinstance(node.value, str) else None

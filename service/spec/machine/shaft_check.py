@@ -8,6 +8,7 @@ from typing import Any, Final, cast
 
 from sprag_study.sentences import Sentence
 from sprag_study.service.faults import Code
+from sprag_study.service.spec.fields import base_pointer
 from sprag_study.service.spec.report import Report
 from sprag_study.worker.models import (
     AssemblyError,
@@ -101,9 +102,7 @@ def check_machine(
             "/base/mean_speed", "inertia-insufficient", error.message, error.asked, allowed=error.allowed, unit="rad/s"
         )
     except machine_shaft.RelationError as error:
-        report.fault(
-            "/base/" + error.path.replace(".", "/"), "conflict", error.message, error.value, allowed=error.allowed
-        )
+        report.fault(base_pointer(error.path), "conflict", error.message, error.value, allowed=error.allowed)
     except MachineError as error:
         where = _pointer(error, structure, places)
         report.fault(where, code_of(error), error.message, error.found, allowed=error.allowed)

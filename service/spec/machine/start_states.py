@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sprag_study.service.spec.derive import layout
+from sprag_study.service.spec.fields import base_pointer
 from sprag_study.worker.derived import blocks, involved
 from sprag_study.worker.models.vibration_drive.start_states import impossible_starts
 
@@ -60,5 +61,5 @@ def _pointer(study: Study, path: str, state: str) -> str:
         if name in study.derive:
             return f"/derive/{name}"
         if name in study.base:
-            return "/base/" + name.replace(".", "/")
+            return base_pointer(name)
     raise AssertionError(state)

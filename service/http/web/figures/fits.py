@@ -9,6 +9,7 @@ from sprag_study.service.reading.units import QuantityError, parse_quantity
 from sprag_study.service.results.fits import fit_json
 from sprag_study.service.spec.derive import with_values
 from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.fields import base_path
 from sprag_study.service.spec.machine.clutch import read_clutch
 from sprag_study.service.spec.node import Node
 from sprag_study.service.spec.report import Report
@@ -34,7 +35,7 @@ def fit_at(spec: Mapping[str, Any], study: Study | None, pointer: str) -> Fitted
     if not clutch.get("data") or "accuracy" not in clutch:
         return None
     known = _backlashes(spec if study is None else _with_derived(spec, study), pointer)
-    prefix = pointer.removeprefix("/base/").replace("/", ".") + "."
+    prefix = base_path(pointer) + "."
     read = read_clutch(Node(Report(), pointer, clutch), prefix, known)
     return None if read is None or read.fit is None else _fitted(read.fit, clutch, known)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode
@@ -13,15 +13,14 @@ from sprag_study.service.figures.drawing import Drawing
 from sprag_study.service.figures.drawings import BETWEEN_FIELDS, drawings
 from sprag_study.service.http.web.figures.fits import FitChart, fit_at
 from sprag_study.service.http.web.form.columns import COLUMNS
-from sprag_study.service.http.web.form.entries import Faults, items_of, list_of, range_of
+from sprag_study.service.http.web.form.entries import Faults
 from sprag_study.service.http.web.form.machine import model_name, places
 from sprag_study.service.http.web.form.machine_spec import step_of
-from sprag_study.service.http.web.form.spec import WAYS, form_with_spec
+from sprag_study.service.http.web.form.spec import form_with_spec
 from sprag_study.service.http.web.form.walk import Filled
 from sprag_study.service.jobs.preview import preview_json
 from sprag_study.service.languages import _, gettext, grouped, ngettext
 from sprag_study.service.reading.faults import message
-from sprag_study.service.reading.numbers import assumption, in_language, settle, settled
 from sprag_study.service.reading.quantities import TYPED
 from sprag_study.service.reading.reader import CLUTCH, Choice, Reading, reading_for
 from sprag_study.service.reading.wording import duration
@@ -176,7 +175,7 @@ def check_form(
     if found.parsed is not None:
         found.preview = preview_json(found.parsed, chunking, known(found.parsed.study), left)
         found.sketch = drawings(found.parsed.study, width=BETWEEN_FIELDS)
-    found.notes += _points(values)
+    found.notes += map(Reading(model_name(values)).warning, form.doubts)
     for pointer in places(values, "measured"):
         found.notes += _assumed(values.get(f"{pointer}/data", ""))
         fit = fit_at(found.spec, None if found.parsed is None else found.parsed.study, pointer)
@@ -187,30 +186,6 @@ def check_form(
 def _beside(name: str, edited: str) -> str:
     """The field for a fault at ``name``: where it is about a part of the machine, that of it which was changed last."""
     return edited if name.startswith("/base/") and edited.startswith(f"{name}/") else name
-
-
-def _points(values: Mapping[str, str]) -> list[str]:
-    """Points of bare numbers of lists and ranges that are taken as decimal; the spec warns of those with units."""
-    notes, reading = [], Reading(model_name(values))
-    for pointer, names, items, entries in _typed_together(values):
-        doubt = settle(items).doubt
-        if doubt is not None and not isinstance(entries[doubt], str):
-            place = Place(f"{pointer}{names[doubt]}", values.get(f"{pointer}path", ""))
-            notes.append(reading.warning(WarningText(assumption(items[doubt]), "ambiguous-point").at(place)))
-    return notes
-
-
-def _typed_together(values: Mapping[str, str]) -> Iterator[tuple[str, list[str], list[str], list[Any]]]:
-    """Lists and ranges of the form: where they are, and for each number its field, its text and its entry."""
-    for name, text in values.items():
-        if name.endswith("/values") and "." in text:
-            items = items_of(text)
-            yield name.removesuffix("values"), ["values"] * len(items), items, list_of(text)
-        way = values.get(f"{name.removesuffix('from')}way", "")
-        if name.endswith("/from") and way != "values":
-            pointer, fields = name.removesuffix("from"), WAYS.get(way, ("from", "to"))
-            items = settled([in_language(values.get(f"{pointer}{field}", "").strip()) for field in fields])
-            yield pointer, list(fields), items, list(range_of(values, pointer, fields).values())
 
 
 def _assumed(text: str) -> list[str]:

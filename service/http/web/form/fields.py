@@ -17,6 +17,7 @@ from sprag_study.service.reading.units import examples
 from sprag_study.service.reading.wording import number, words
 from sprag_study.service.spec.axes.sample import SAMPLE
 from sprag_study.service.spec.described import ANY_RUN, DURATION, SETTLED_RUN, Described
+from sprag_study.service.spec.fields import base_pointer
 from sprag_study.service.spec.kinds import goal, refine
 from sprag_study.worker import models
 from sprag_study.worker.models import Parameter
@@ -49,7 +50,7 @@ class Field:
 def field_for(entry: Parameter, path: str) -> Field:
     """The field of a parameter at ``path`` of the base."""
     return Field(
-        name="/base/" + path.replace(".", "/"),
+        name=base_pointer(path),
         label=_(words(path.rsplit(".", maxsplit=1)[-1])),
         symbol=entry.symbol,
         unit=entry.unit,

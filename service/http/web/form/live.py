@@ -30,6 +30,7 @@ from sprag_study.service.http.work import Attended, Work
 from sprag_study.service.reading.reader import meanings, reading_for
 from sprag_study.service.results.regimes import motion_sentence
 from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.fields import base_path
 from sprag_study.service.spec.kinds.registry import without_cases
 from sprag_study.service.spec.machine.shaft_check import NotCompiledError
 from sprag_study.service.spec.report import SpecError
@@ -73,7 +74,7 @@ def studies_along(values: Mapping[str, str], spec: Mapping[str, Any]) -> list[tu
     """By the name of its field, a study along each number in sight of a machine that can be computed at once."""
     found = []
     for entry in entries(values):
-        path = entry.name.removeprefix("/base/").replace("/", ".")
+        path = base_path(entry.name)
         usual = {entry.name: values.get(entry.name, "").strip() or entry.field.default}
         ends = ends_of({**values, **usual}, path) if entry.tolerant and form_of(values).in_sight(path) else None
         if ends is not None:

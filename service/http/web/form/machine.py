@@ -17,6 +17,7 @@ from sprag_study.service.languages import _
 from sprag_study.service.reading.reader import part_label, shown
 from sprag_study.service.reading.wording import words
 from sprag_study.service.spec.described import Described, below
+from sprag_study.service.spec.fields import base_path
 from sprag_study.service.spec.machine.registry import part_of
 from sprag_study.service.spec.node import Node
 from sprag_study.service.spec.report import Report
@@ -237,7 +238,7 @@ class _Machine:
 
     def _field(self, item: data.FormField, place: str) -> Entry:
         name = f"{place}/{item.name}"
-        path = name.removeprefix(f"{BASE}/").replace("/", ".")
+        path = base_path(name)
         entry = None if item.kind else model_parameter(self.model, path) or _described(self.model, path)
         if entry is None:
             own = Field(name, item.label, item.help)

@@ -27,8 +27,10 @@ from sprag_study.service.reading.together import with_last_unit
 from sprag_study.service.reading.units import QuantityError, parse_quantity, split_typed
 from sprag_study.service.reading.wording import unit_text
 from sprag_study.service.spec.derive import formulas_of, with_values
+from sprag_study.service.spec.fields import base_path, base_pointer
 from sprag_study.service.spec.measured import MeasuredDataError, parse_measured
-from sprag_study.service.spec.report import join
+from sprag_study.service.spec.node import Node
+from sprag_study.service.spec.report import Report, join
 from sprag_study.worker.models.form import FormChoice, FormField
 
 #: Beginning of a field with the formula of a derived parameter.
@@ -52,7 +54,7 @@ class Machine:
         form.fields |= {entry.name: entry.name for entry in every}
         derive = _formulas(base)
         for path in derive:
-            form.fields[join("/derive", path)] = form.field_of(f"{BASE}/{path.replace('.', '/')}")
+            form.fields[join("/derive", path)] = form.field_of(base_pointer(path))
         return {"base": base, **({"derive": derive} if derive else {})}
 
     def show(self, item: Mapping[str, Any], form: Filled) -> set[str]:
@@ -245,12 +247,7 @@ def _leaves(value: Any, pointer: str = BASE) -> Iterator[str]:
 
 def _at(base: Any, pointer: str) -> Any:
     """The entry at a pointer of a base; None where it has none."""
-    for key in pointer.removeprefix(f"{BASE}/").split("/"):
-        if isinstance(base, Mapping):
-            base = base.get(key)
-        else:
-            base = base[int(key)] if isinstance(base, list) and key.isdigit() and int(key) < len(base) else None
-    return base
+    return Node(Report(), BASE, base).below(base_path(pointer)).value
 
 
 def _text(entry: Entry, base: Mapping[str, Any]) -> str | None:

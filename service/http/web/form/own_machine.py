@@ -10,7 +10,10 @@ from urllib.parse import urlencode
 from sprag_study.service.http.problems import ApiError
 from sprag_study.service.spec.derive import with_values
 from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.fields import base_path
 from sprag_study.service.spec.kinds.registry import WHICH_CASES, without_cases
+from sprag_study.service.spec.node import Node
+from sprag_study.service.spec.report import Report
 from sprag_study.service.spec.stored import accepted
 from sprag_study.worker import models
 from sprag_study.worker.limits import MAX_ADDRESS_BYTES
@@ -33,40 +36,26 @@ def single_machine(spec: Mapping[str, Any]) -> dict[str, Any]:
     """
     spec = accepted(spec)
     axes = parse_spec(spec).study.axes
+    base = Node(Report(), "/base", spec["base"])
     middle = {path: axis.values[len(axis.values) // 2] for axis in axes for path in axis.paths}
     given = {
         path: value for path, value in middle.items()
-        if path not in models.NO_PARAMETERS and not _gives(spec["base"], path)
+        if path not in models.NO_PARAMETERS and not base.below(path).given
     }  # fmt: skip
     kept = without_cases(spec)
     parsed = parse_spec({**kept, "base": with_values(spec["base"], given)})
     study = parsed.study
-    base = with_values(parsed.spec["base"], {path: study.base[path] for path in study.derive})
-    for pointer in parsed.fits:
-        _put_law(base, pointer.removeprefix("/base/").split("/"), study)
-    return {**{key: value for key, value in kept.items() if key not in _NOT_HERE}, "base": base}
+    laws = {base_path(pointer): _law(f"{base_path(pointer)}.", study) for pointer in parsed.fits}
+    numbers = with_values(parsed.spec["base"], {path: study.base[path] for path in study.derive})
+    return {**{key: value for key, value in kept.items() if key not in _NOT_HERE}, "base": with_values(numbers, laws)}
 
 
-def _put_law(base: dict[str, Any], keys: list[str], study: Study) -> None:
-    """Replace measured data of the clutch at ``keys`` by the coefficients of their fit."""
-    *above, last = keys
-    place: Any = base
-    for key in above:
-        place = place[int(key)] if isinstance(place, list) else place[key]
-    prefix = ".".join(keys) + "."
+def _law(prefix: str, study: Study) -> dict[str, Any]:
+    """The law of the clutch whose numbers have paths with this beginning."""
     count = sum(path.startswith(f"{prefix}coefficients.") for path in study.base)
-    limit = study.base.get(f"{prefix}windup_limit", float("inf"))
+    limit = study.base.get(f"{prefix}windup_limit", math.inf)
     law = {"coefficients": [study.base[f"{prefix}coefficients.{k}"] for k in range(count)]}
-    place[last] = law | ({"windup_limit": limit} if limit != float("inf") else {})
-
-
-def _gives(base: Any, path: str) -> bool:
-    """Whether the base of a spec has a number at a flat path."""
-    for key in path.split("."):
-        if isinstance(base, dict) and key not in base:
-            return False
-        base = base[int(key)] if isinstance(base, list) else base[key]
-    return True
+    return law | ({} if math.isinf(limit) else {"windup_limit": limit})
 
 
 def own_spec(given: Mapping[str, str], model: str) -> dict[str, Any]:

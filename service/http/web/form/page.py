@@ -70,6 +70,7 @@ from sprag_study.service.reading.together import split_list
 from sprag_study.service.reading.units import QuantityError, parse_quantity
 from sprag_study.service.spec.design import design_spec
 from sprag_study.service.spec.document import UNNAMED
+from sprag_study.service.spec.fields import base_path, base_pointer
 from sprag_study.service.spec.kinds.registry import without_cases
 from sprag_study.service.spec.stored import accepted
 from sprag_study.worker import models
@@ -142,7 +143,7 @@ def _set(values: Values, given: Mapping[str, str], vary: list[str], along: str |
     values |= {name: given[name] for name, known in _ASKED.items() if given.get(name) in known}
     known = {entry.name: entry for entry in entries(values, hidden=True)}
     for path, text in given.items():
-        name = f"{BASE}/{path.replace('.', '/')}"
+        name = base_pointer(path)
         listed, _slash, place = name.rpartition("/")
         if name in known:
             values[name] = text
@@ -395,7 +396,7 @@ def _sheet(request: Request, values: Values, checked: Checked, opened: str = "")
 
 def _numbers(values: Values) -> dict[str, float]:
     """The numbers of a form (SI, by path) that can be read."""
-    return {name.removeprefix(f"{BASE}/").replace("/", "."): value for name, value in _read_numbers(values).items()}
+    return {base_path(name): value for name, value in _read_numbers(values).items()}
 
 
 def _read_numbers(values: Values) -> dict[str, float]:

@@ -11,6 +11,7 @@ from sprag_study.service.http.web.form.spec import PARTS
 from sprag_study.service.http.web.form.tolerances import OWN
 from sprag_study.service.http.web.form.walk import Rows
 from sprag_study.service.reading.numbers import whole_number
+from sprag_study.service.spec.fields import base_path
 from sprag_study.worker.models import form as data
 
 
@@ -71,7 +72,7 @@ def _enclose(values: Values, rows: data.Rows) -> None:
 def _copy_row(values: Values, pointer: str, source: int, target: int) -> None:
     """Copy the fields of a row; what follows from numbers of it, or shares their draws, does so in the same row."""
     copy(values, f"{pointer}/{source}/", f"{pointer}/{target}/")
-    paths = pointer.removeprefix(OWN).removeprefix(f"{BASE}/").replace("/", ".")
+    paths = base_path(pointer.removeprefix(OWN))
     for name in [name for name in values if name.startswith(f"{pointer}/{target}/")]:
         if name.endswith("/with") or "=" in values[name]:
             values[name] = values[name].replace(f"{paths}.{source}.", f"{paths}.{target}.")

@@ -17,6 +17,7 @@ from sprag_study.service.http.web.form.tolerances import BATCH, own_name
 from sprag_study.service.reading.quantities import is_si
 from sprag_study.service.reading.together import with_last_unit
 from sprag_study.service.reading.units import QuantityError, split_quantity
+from sprag_study.service.spec.fields import base_pointer
 from sprag_study.worker import models
 from sprag_study.worker.models.form import FormChoice, Rows
 
@@ -170,7 +171,7 @@ def _vary(values: Values, name: str, path: str, *, wanted: bool) -> None:
 
 def ends_of(values: Mapping[str, str], path: str) -> tuple[str, str] | None:
     """Ends proposed for a number: its value times the factors of its kind; None where it is 0 or unknown."""
-    text = values.get(f"{BASE}/{path.replace('.', '/')}", "").strip()
+    text = values.get(base_pointer(path), "").strip()
     try:
         number, unit = split_quantity(text)
     except QuantityError:

@@ -25,6 +25,7 @@ from sprag_study.service.reading.quantities import SI, offered, read_units, work
 from sprag_study.service.reading.together import with_last_unit
 from sprag_study.service.reading.units import QuantityError, parse_quantity, plain_signs
 from sprag_study.service.reading.wording import number, unit_text
+from sprag_study.service.spec.fields import base_path, base_pointer
 from sprag_study.worker.models.form import FormChoice
 from sprag_study.worker.models.parameters import model_parameter
 from sprag_study.worker.models.vocabulary import bare_caption
@@ -111,7 +112,7 @@ class Plan:
     @property
     def name(self) -> str:
         """Name of the choice of the part that is drawn; "" for the whole machine."""
-        return f"{BASE}/{self.drawing.at.replace('.', '/')}" if self.drawing.at else ""
+        return base_pointer(self.drawing.at) if self.drawing.at else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,7 +224,7 @@ def sheet_of(
     spots = {entry.name: made.spot(entry, repeated) for entry in found if entry.control == "line"}
     alone = {entry.name for block in every for own in (block, *block.within) for entry in own.entries}
     front = frozenset(
-        entry.name for entry in found if form.in_sight(made.path(entry.name))
+        entry.name for entry in found if form.in_sight(base_path(entry.name))
         or (entry.name in alone and entry.control in _MOVED and _differs(values, begun, (entry,)))
     )  # fmt: skip
     by_path = {spot.path: spot for spot in spots.values() if spot.name in front}
@@ -351,12 +352,8 @@ class _Making:
     units: Mapping[str, str]
     before: Values | None
 
-    def path(self, name: str) -> str:
-        """The path of the number of a field."""
-        return name.removeprefix(f"{BASE}/").replace("/", ".")
-
     def spot(self, entry: Entry, repeated: set[str]) -> Spot:
-        field, path, text = entry.field, self.path(entry.name), self.values.get(entry.name, "")
+        field, path, text = entry.field, base_path(entry.name), self.values.get(entry.name, "")
         label = _(field.label)
         if field.label in repeated and path in self.numbers:
             label = bare_caption(model_name(self.values), path, gettext)

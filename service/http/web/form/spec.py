@@ -16,7 +16,6 @@ from sprag_study.service.http.web.form.entries import (
     path_values,
     paths_of,
     plain,
-    range_of,
     text_of,
     unclear,
 )
@@ -84,7 +83,7 @@ def _listed(way: str) -> Cell:
     """Values that a list under the name of the way gives: its ends, and their number or step."""
     names = WAYS[way]
     return Cell(
-        (way,), names, lambda form: {way: list(range_of(form.values, f"{form.at}/", names).values())},
+        (way,), names, lambda form: {way: form.ranged(names)},
         lambda item: {name: text_of(end) for name, end in zip(names, item[way], strict=True)},
     )  # fmt: skip
 
@@ -122,7 +121,7 @@ class _Points:
         columns: dict[str, list[Any]] = {}
         rows = [form.inside(f"{_AT.pointer}/{row}") for row in _AT.filled(form.values)]
         for row in rows:
-            path, column = row.text("path"), list_of(row.text("values"))
+            path, column = row.text("path"), row.listed("values")
             if not path or path in columns:
                 form.faults[f"{row.at}/path"] = [
                     _("is a parameter of the points already") if path else _("is required")
@@ -230,10 +229,13 @@ _PATHS: Final = Cell(
     lambda item: {name.removeprefix("/"): text for name, text in path_values("", item["path"]).items()},
 )  # fmt: skip
 _RANGE: Final = Cell(
-    ("from", "to"), ("from", "to"), lambda form: range_of(form.values, f"{form.at}/"),
+    ("from", "to"), ("from", "to"), lambda form: dict(zip(("from", "to"), form.ranged(), strict=True)),
     lambda item: {name: text_of(item[name]) for name in ("from", "to")},
 )  # fmt: skip
-_VALUES: Final = typed("values", list_of, list_text, always=True)
+_VALUES: Final = Cell(
+    ("values",), ("values",), lambda form: {"values": form.listed("values")},
+    lambda item: {"values": list_text(item["values"])},
+)  # fmt: skip
 _RESULT: Final = typed("result", lambda text: text or None, str, always=True)
 _TOWARD: Final = Cell(
     ("max",), ("toward",), lambda form: {"max": True} if form.text("toward", "max") == "max" else {},

@@ -13,7 +13,7 @@ from sprag_study.service.http.web.form.walk import Filled
 from sprag_study.service.languages import _
 from sprag_study.service.reading.wording import words
 from sprag_study.service.spec.draws.described import DISTRIBUTION
-from sprag_study.service.spec.fields import expanded
+from sprag_study.service.spec.fields import base_path, expanded
 from sprag_study.service.spec.kinds.tolerances import DRAWS
 
 #: Fields of a spec that this part of the form shows.
@@ -60,7 +60,7 @@ class Tolerances:
 
     def show(self, item: Mapping[str, Any], form: Filled) -> set[str]:
         """As of a `Member`, of a machine that the form shows already."""
-        shown = {name.removeprefix("/base/").replace("/", "."): name for name in _tolerant(form.values)}
+        shown = {base_path(name): name for name in _tolerant(form.values)}
         order: list[str] = []
         for given in item.get("tolerances", ()):
             listed = given["path"] if isinstance(given["path"], list) else [given["path"]]

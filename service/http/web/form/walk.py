@@ -5,11 +5,23 @@ A part of a spec is described once, by members that know their entries and the f
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, Protocol
 
-from sprag_study.service.http.web.form.entries import Faults, Values, count_in, plain, text_of
+from sprag_study.sentences import Place, WarningText
+from sprag_study.service.http.web.form.entries import (
+    Faults,
+    Values,
+    count_in,
+    entries_of,
+    items_of,
+    plain,
+    range_of,
+    text_of,
+)
+from sprag_study.service.reading.numbers import assumption, in_language, settle, settled
+from sprag_study.service.reading.together import with_last_unit
 from sprag_study.worker.models import form as data
 
 BASE: Final = "/base"
@@ -26,6 +38,7 @@ class Filled:
     pointer : JSON Pointer of the object
     faults : by field, of what cannot be expressed as a spec
     fields : the field beside which a fault is shown, by its pointer; it is also that of what is inside
+    doubts : points of bare numbers of lists and ranges that are taken as decimal; the spec warns of those with units
     """
 
     values: Values
@@ -33,6 +46,7 @@ class Filled:
     pointer: str = ""
     faults: Faults = field(default_factory=dict)
     fields: dict[str, str] = field(default_factory=dict)
+    doubts: list[WarningText] = field(default_factory=list)
 
     def inside(self, at: str, pointer: str = "") -> Filled:
         """Another object of the same form."""
@@ -41,6 +55,24 @@ class Filled:
     def text(self, name: str, usual: str = "") -> str:
         """The text of a field."""
         return self.values.get(f"{self.at}/{name}", usual).strip()
+
+    def listed(self, name: str) -> list[Any]:
+        """The entries of a field with a list, as of `list_of`."""
+        items = items_of(self.text(name))
+        return self._certain([name] * len(items), items, entries_of(with_last_unit(items)))
+
+    def ranged(self, names: Sequence[str] = ("from", "to")) -> list[Any]:
+        """The entries of fields that are the ends of a range, as of `range_of`."""
+        items = settled([in_language(self.text(name)) for name in names])
+        return self._certain(names, items, list(range_of(self.values, f"{self.at}/", names).values()))
+
+    def _certain(self, names: Sequence[str], items: Sequence[str], entries: list[Any]) -> list[Any]:
+        """The entries, of which a doubtful one is noted."""
+        doubt = settle(items).doubt
+        if doubt is not None and not isinstance(entries[doubt], str):
+            place = Place(f"{self.at}/{names[doubt]}", self.text("path"))
+            self.doubts.append(WarningText(assumption(items[doubt]), "ambiguous-point").at(place))
+        return entries
 
     def show(self, texts: Mapping[str, str]) -> None:
         """Set the texts of fields."""
