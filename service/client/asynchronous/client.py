@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from sprag_study.service.answers.people import AuditEntry, Me, User
     from sprag_study.service.answers.saved_views import SavedViewEntry
     from sprag_study.service.answers.schedules import Night, ScheduleDetail, ScheduleSummary
-    from sprag_study.service.answers.studies import ClutchFitReport, Preview, StudySummary
+    from sprag_study.service.answers.studies import ClutchFitReport, Preview
     from sprag_study.service.answers.workers import WorkerList
     from sprag_study.service.client.comparison import Comparison
     from sprag_study.service.client.queries import Held, Spec, Value
@@ -80,7 +80,7 @@ class AsyncClient(AsyncConnection):
         finish = None if finish_by is None else finish_text(finish_by)
         query = query_of({"priority": priority or None, "fresh": fresh, "finish_by": finish})
         made = await self.request("POST", "/studies", key=key or "", json=spec_of(spec, cases), params=query)
-        return AsyncStudy(self, made["id"])
+        return AsyncStudy(self, made["id"], made)
 
     async def study(self, study_id: str) -> AsyncStudy:
         """A study by its id, its name, or the beginning of one; "latest": the newest.
@@ -89,7 +89,8 @@ class AsyncClient(AsyncConnection):
         an empty text, or no text.
         """
         found = await study_of(self, study_id)
-        return AsyncStudy(self, (await self.request("GET", study_path(found)))["id"])
+        detail = await self.request("GET", study_path(found))
+        return AsyncStudy(self, detail["id"], detail)
 
     async def studies(
         self,
@@ -102,8 +103,10 @@ class AsyncClient(AsyncConnection):
         archived: bool = False,
         deleted: bool = False,
         sort: str | None = None,
-    ) -> AsyncIterator[StudySummary]:
+    ) -> AsyncIterator[AsyncStudy]:
         """Every study that is neither archived nor deleted, or those that are searched for.
+
+        Each has its ``summary``, whose fields are its items, too: ``study["owner"]``.
 
         Parameters
         ----------
@@ -119,7 +122,7 @@ class AsyncClient(AsyncConnection):
         words = {"state": state, "search": search, "tag": tag, "owner": owner, "model": model, "sort": sort}
         query = query_of({**words, "archived": archived, "deleted": deleted})
         async for study in self.items("/studies", "studies", query):
-            yield cast("StudySummary", study)
+            yield AsyncStudy(self, study["id"], study)
 
     async def compare(
         self,

@@ -11,7 +11,7 @@ from sprag_study.service.client.asynchronous.tables import AsyncStudyTables
 from sprag_study.service.client.asynchronous.views import AsyncStudyViews
 from sprag_study.service.client.bars import reporting
 from sprag_study.service.client.queries import extension, query_of
-from sprag_study.service.client.shown import AsyncShown
+from sprag_study.service.client.shown import AsyncShown, shown
 from sprag_study.service.client.waiting import Waiting
 
 if TYPE_CHECKING:
@@ -23,14 +23,21 @@ if TYPE_CHECKING:
 
 
 class AsyncStudy(AsyncStudyViews, AsyncStudyTables, AsyncShown):
-    """One study of the service. ``id`` is its public name."""
+    """One study of the service. ``id`` is its public name, ``summary`` what the service last said of it.
+
+    Fields of the summary are its items, too: ``study["owner"]``.
+    """
 
     def __repr__(self) -> str:
-        return f"AsyncStudy({self.id!r})"
+        return f"AsyncStudy({shown(self.id, self.summary)})"
+
+    def __getitem__(self, field: str) -> Any:
+        return (self.summary or {})[field]
 
     async def detail(self) -> StudyDetail:
         """The current study, with its progress and its spec."""
-        return cast("StudyDetail", await self._get(""))
+        self.summary = await self._get("")
+        return cast("StudyDetail", self.summary)
 
     async def rounds(self) -> list[Round]:
         """The rounds of a study that chooses its own cases, each with what was known before it; [] of others."""
@@ -51,7 +58,7 @@ class AsyncStudy(AsyncStudyViews, AsyncStudyTables, AsyncShown):
             Seconds after which StudyTimeoutError is raised; the study continues. NaN raises ValueError.
         """
         with reporting(progress) as tell:
-            await wait_for(self._client, self.id, Waiting(tell, timeout))
+            self.summary = await wait_for(self._client, self.id, Waiting(tell, timeout))
         return self
 
     async def events(self) -> AsyncGenerator[StudyEvent, None]:
@@ -113,7 +120,7 @@ class AsyncStudy(AsyncStudyViews, AsyncStudyTables, AsyncShown):
 
     async def _further(self, verb: str, key: str | None, **arguments: Any) -> AsyncStudy:
         made = await self._client.request("POST", f"{self._path}:{verb}", key=key or "", **arguments)
-        return type(self)(self._client, made["id"])
+        return type(self)(self._client, made["id"], made)
 
     async def pause(self) -> StudySummary:
         """Hold the study: no new cases are started until it is resumed."""

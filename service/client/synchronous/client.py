@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from sprag_study.service.answers.people import AuditEntry, Me, User
     from sprag_study.service.answers.saved_views import SavedViewEntry
     from sprag_study.service.answers.schedules import Night, ScheduleDetail, ScheduleSummary
-    from sprag_study.service.answers.studies import ClutchFitReport, Preview, StudySummary
+    from sprag_study.service.answers.studies import ClutchFitReport, Preview
     from sprag_study.service.answers.workers import WorkerList
     from sprag_study.service.client.comparison import Comparison
     from sprag_study.service.client.queries import Held, Spec, Value
@@ -80,7 +80,7 @@ class Client(Connection):
         finish = None if finish_by is None else finish_text(finish_by)
         query = query_of({"priority": priority or None, "fresh": fresh, "finish_by": finish})
         made = self.request("POST", "/studies", key=key or "", json=spec_of(spec, cases), params=query)
-        return Study(self, made["id"])
+        return Study(self, made["id"], made)
 
     def study(self, study_id: str) -> Study:
         """A study by its id, its name, or the beginning of one; "latest": the newest.
@@ -89,7 +89,8 @@ class Client(Connection):
         an empty text, or no text.
         """
         found = study_of(self, study_id)
-        return Study(self, (self.request("GET", study_path(found)))["id"])
+        detail = self.request("GET", study_path(found))
+        return Study(self, detail["id"], detail)
 
     def studies(
         self,
@@ -102,8 +103,10 @@ class Client(Connection):
         archived: bool = False,
         deleted: bool = False,
         sort: str | None = None,
-    ) -> Iterator[StudySummary]:
+    ) -> Iterator[Study]:
         """Every study that is neither archived nor deleted, or those that are searched for.
+
+        Each has its ``summary``, whose fields are its items, too: ``study["owner"]``.
 
         Parameters
         ----------
@@ -119,7 +122,7 @@ class Client(Connection):
         words = {"state": state, "search": search, "tag": tag, "owner": owner, "model": model, "sort": sort}
         query = query_of({**words, "archived": archived, "deleted": deleted})
         for study in self.items("/studies", "studies", query):
-            yield cast("StudySummary", study)
+            yield Study(self, study["id"], study)
 
     def compare(
         self,

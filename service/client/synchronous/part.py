@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from sprag_study.service.client.wire import case_path, study_path
@@ -12,12 +13,20 @@ if TYPE_CHECKING:
 
 
 class StudyPart:
-    """A study at its address. ``id`` is its public name."""
+    """A study at its address.
 
-    def __init__(self, client: Connection, study_id: str) -> None:
+    Attributes
+    ----------
+    id : str
+        Its public name.
+    summary : mapping or None
+        What the service last said of it: name, state, progress and so on; None before.
+    """
+
+    def __init__(self, client: Connection, study_id: str, summary: Mapping[str, Any] | None = None) -> None:
         self._client = client
         self._path = study_path(study_id)
-        self.id = study_id
+        self.id, self.summary = study_id, summary
 
     def _of_case(self, case: int, part: str = "", query: Query = ()) -> dict[str, Any]:
         return self._client.request("GET", case_path(self.id, case, part), params=list(query))

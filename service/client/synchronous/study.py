@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from sprag_study.service.client.bars import reporting
 from sprag_study.service.client.queries import extension, query_of
-from sprag_study.service.client.shown import Shown
+from sprag_study.service.client.shown import Shown, shown
 from sprag_study.service.client.synchronous.following import events_of, wait_for
 from sprag_study.service.client.synchronous.tables import StudyTables
 from sprag_study.service.client.synchronous.views import StudyViews
@@ -23,14 +23,21 @@ if TYPE_CHECKING:
 
 
 class Study(StudyViews, StudyTables, Shown):
-    """One study of the service. ``id`` is its public name."""
+    """One study of the service. ``id`` is its public name, ``summary`` what the service last said of it.
+
+    Fields of the summary are its items, too: ``study["owner"]``.
+    """
 
     def __repr__(self) -> str:
-        return f"Study({self.id!r})"
+        return f"Study({shown(self.id, self.summary)})"
+
+    def __getitem__(self, field: str) -> Any:
+        return (self.summary or {})[field]
 
     def detail(self) -> StudyDetail:
         """The current study, with its progress and its spec."""
-        return cast("StudyDetail", self._get(""))
+        self.summary = self._get("")
+        return cast("StudyDetail", self.summary)
 
     def rounds(self) -> list[Round]:
         """The rounds of a study that chooses its own cases, each with what was known before it; [] of others."""
@@ -51,7 +58,7 @@ class Study(StudyViews, StudyTables, Shown):
             Seconds after which StudyTimeoutError is raised; the study continues. NaN raises ValueError.
         """
         with reporting(progress) as tell:
-            wait_for(self._client, self.id, Waiting(tell, timeout))
+            self.summary = wait_for(self._client, self.id, Waiting(tell, timeout))
         return self
 
     def events(self) -> Generator[StudyEvent, None, None]:
@@ -110,7 +117,7 @@ class Study(StudyViews, StudyTables, Shown):
 
     def _further(self, verb: str, key: str | None, **arguments: Any) -> Study:
         made = self._client.request("POST", f"{self._path}:{verb}", key=key or "", **arguments)
-        return type(self)(self._client, made["id"])
+        return type(self)(self._client, made["id"], made)
 
     def pause(self) -> StudySummary:
         """Hold the study: no new cases are started until it is resumed."""

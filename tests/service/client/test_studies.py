@@ -116,7 +116,11 @@ def test_a_study_from_submission_to_table_grid_and_curves(
     larger = study.extend([{"path": "shaft.load", "values": [0.5]}], name="larger")
     assert larger.detail()["cases"] == 12
     assert [item["id"] for item in client.studies()] == [larger.id, study.id]
-    assert [item["name"] for item in client.studies("queued")] == ["larger"]
+    (queued,) = client.studies("queued")
+    assert (queued["name"], queued.name, queued.state) == ("larger", "larger", "queued")
+    assert (client.study(study.id).state, study.name) == ("finished", study["name"])
+    assert repr(study) == f"Study({study.id!r}, {study.name!r}, 9 cases, finished)"
+    assert repr(queued) == f"Study({larger.id!r}, 'larger', 12 cases)"
     assert larger.cancel()["state"] in ("cancelling", "cancelled")
     assert client.study(study.id).detail()["progress"]["endings"] == {"ok": 8, "chatter": 1}
 
@@ -218,7 +222,9 @@ async def asynchronous(service: Service, spec: dict[str, Any], folder: Path) -> 
         assert (await study.download("csv")).startswith(b"case,")
         larger = await study.extend(cases=[{"points": "shaft.load\n0.9\n"}])
         assert (await larger.detail())["cases"] == 10
-        assert [item["id"] async for item in client.studies()] == [larger.id, study.id]
+        listed = [item async for item in client.studies()]
+        assert [item.id for item in listed] == [larger.id, study.id]
+        assert [item.state for item in listed] == ["queued", "finished"]
         assert (await larger.cancel())["id"] == larger.id
         with pytest.raises(StudyTimeoutError):
             await (await client.submit(spec, fresh=True)).wait(timeout=0.0)
