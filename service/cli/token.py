@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import typer
 
 from sprag_study.service.cli import completion
-from sprag_study.service.cli.console import WrongInputError, say, show_table, write_json, wrong_option
+from sprag_study.service.cli.console import WrongInputError, say, show_table, write_json
 from sprag_study.service.cli.groups import Groups
 from sprag_study.service.cli.names import token_of, user_of
 from sprag_study.service.cli.options import Database, JsonFlag
 from sprag_study.service.cli.user import users_of
 from sprag_study.service.languages import N_, _
-from sprag_study.service.storage.people.scopes import TokenScope, TokenState
-from sprag_study.worker.limits import MAX_NAME_LENGTH
+from sprag_study.service.storage.people.scopes import TokenScope, TokenState, token_name
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -74,13 +73,10 @@ def create(
     as_json: JsonFlag = False,
 ) -> None:
     """Create a token and print it; only its digest is stored, so it cannot be shown again."""
-    if not 1 <= len(name) <= MAX_NAME_LENGTH or not name.isprintable() or not name.strip():
-        allowed = _("1 to {most} printable characters in one line", most=MAX_NAME_LENGTH)
-        raise wrong_option("--name", "invalid-text", N_("is not the name of a token"), name, allowed=allowed)
     with users_of(db, as_json) as store:
         ends = None if expires is None else store.clock.now() + timedelta(days=expires)
         owner = None if user is None else user_of(store.people, user, "--user")
-        secret, record = store.people.create_token(name, scope, owner=owner, expires_at=ends)
+        secret, record = store.people.create_token(token_name(name, "--name"), scope, owner=owner, expires_at=ends)
     if as_json:
         write_json({"database": store.session.location, "token": secret, **_json(record)})
     else:

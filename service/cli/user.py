@@ -9,13 +9,14 @@ import typer
 
 from sprag_study.service.actor import Role
 from sprag_study.service.cli import completion
-from sprag_study.service.cli.console import WrongInputError, say, show_table, time_text, write_json, wrong_option
+from sprag_study.service.cli.console import WrongInputError, say, show_table, time_text, write_json
 from sprag_study.service.cli.groups import Groups
 from sprag_study.service.cli.names import user_of
 from sprag_study.service.cli.options import Database, JsonFlag
 from sprag_study.service.cli.stores import named_store
-from sprag_study.service.languages import N_, _
-from sprag_study.service.storage.people.scopes import MAX_USER_NAME
+from sprag_study.service.faults import FaultError
+from sprag_study.service.languages import _
+from sprag_study.service.storage.people.scopes import user_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -72,11 +73,8 @@ def add(
     as_json: JsonFlag = False,
 ) -> None:
     """Add a user, who logs in with a token (`sprag token create --user`) or through a trusted proxy."""
-    if not 1 <= len(name) <= MAX_USER_NAME or not name.isprintable() or name != name.strip():
-        allowed = _("1 to {most} printable characters, no blank at either end", most=MAX_USER_NAME)
-        raise wrong_option("NAME", "invalid-text", N_("is not the name of a user"), name, allowed=allowed)
     with users_of(db, as_json) as store:
-        record = store.people.add_user(name, role or Role.DESIGNER, _quota(cases, storage, checks))
+        record = store.people.add_user(user_name(name, "NAME"), role or Role.DESIGNER, _quota(cases, storage, checks))
     _show(
         store,
         record,
@@ -178,7 +176,7 @@ def hand_over(
 
 @contextmanager
 def users_of(db: str | None, as_json: bool) -> Iterator[Store]:
-    """The store of a database; an unknown user, or one who exists already, is wrong input."""
+    """The store of a database; an unknown user, one who exists already, and a wrong name are wrong input."""
     from sprag_study.service.storage.errors import UserExistsError, UserNotFoundError
 
     with named_store(db, quiet=as_json) as store:
@@ -188,6 +186,8 @@ def users_of(db: str | None, as_json: bool) -> Iterator[Store]:
             raise WrongInputError("user-not-found", str(error)) from error
         except UserExistsError as error:
             raise WrongInputError("user-exists", str(error)) from error
+        except FaultError as error:
+            raise WrongInputError("invalid-parameter", error.detail, error.faults) from error
 
 
 def _quota(cases: int | None, storage: int | None, checks: int | None) -> Quota:

@@ -89,6 +89,7 @@ _DESIGNER: Final = (
     f"POST {_PAGE}/extend",
     f"POST {_PAGE}/delete", f"POST {_PAGE}/longer/{{kind}}", f"POST {_PAGE}/narrow", f"POST {_PAGE}/{{verb}}",
     f"POST {_PAGE}/rows/longer",
+    "POST /me/tokens",
     "POST /nights/new", "POST /nights/{schedule_id}", "POST /nights/{schedule_id}/{verb}",
 )  # fmt: skip
 _ADMINISTRATOR: Final = (
@@ -96,6 +97,7 @@ _ADMINISTRATOR: Final = (
     "GET /api/v1/users",
     "GET /me/audit",
     "GET /me/users",
+    "POST /me/users",
     "GET /audit",
     "GET /users",
 )

@@ -1,13 +1,15 @@
-"""Me: how somebody reads (language, units, time zone), and tokens; for administrators users and the audit log."""
+"""Me: how somebody reads (language, units, time zone), and own tokens; for administrators users and the audit log."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Final
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from fastapi import Query, Request
 from starlette.responses import RedirectResponse, Response
 
 from sprag_study.service import languages
+from sprag_study.service.actor import Role
 from sprag_study.service.exports.audit import entry_json
 from sprag_study.service.faults import FaultError, choice_of
 from sprag_study.service.http.access import COOKIE
@@ -17,6 +19,14 @@ from sprag_study.service.http.language import PARAMETER, keep_language
 from sprag_study.service.http.people import Action, Actor, Since, Target, Until, user_json
 from sprag_study.service.http.reading import PageChoice, keep, keep_zone
 from sprag_study.service.http.routers import page_router
+from sprag_study.service.http.web.administration import (
+    GRACE,
+    administers,
+    change_token,
+    change_user,
+    listed_tokens,
+    own_name,
+)
 from sprag_study.service.http.web.form.values import Form
 from sprag_study.service.http.web.templates import page
 from sprag_study.service.http.web.way_in import access_of, within
@@ -27,14 +37,14 @@ from sprag_study.service.reading.faults import message
 from sprag_study.service.reading.quantities import KINDS, SI, TYPED, WORKSHOP, read_units
 from sprag_study.service.reading.reader import CAPTIONS, CODES, Choice
 from sprag_study.service.storage.people.audit import AuditPage, audit_filter
+from sprag_study.service.storage.people.scopes import MAX_USER_NAME
 from sprag_study.service.zones import is_zone, zones
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Callable, Mapping
     from datetime import datetime
 
-    from sprag_study.service.storage.people.people import TokenRecord, UserRecord
-    from sprag_study.service.storage.people.scopes import TokenState
+    from sprag_study.service.storage.people.people import TokenRecord
 
 router = page_router()
 
@@ -53,18 +63,22 @@ _LISTED: Final = 100
 
 def _parts() -> dict[str, str]:
     """The parts that the reader may open."""
-    grant = current().grant
-    return PARTS | (_OF_ADMINISTRATORS if grant is not None and grant.role.value == "administrator" else {})
+    return PARTS | (_OF_ADMINISTRATORS if administers() else {})
 
 
 @router.get("/me")
 def me(context: Ctx, request: Request, choice: PageChoice, back: str = "/") -> Response:
-    """How somebody reads and who is logged in."""
+    """How somebody reads, who is logged in, and the tokens of this user."""
+    return _me(context, request, choice, back)
+
+
+def _me(context: Context, request: Request, choice: Choice, back: str, status: int = 200, **shown: Any) -> Response:
     rest, chosen = read_units(choice.units)
-    grant = current().grant
-    return page(
+    user = own_name()
+    return _private(
         "me.html",
-        parts=_parts(),
+        status,
+        part="/me",
         kinds=KINDS,
         rests=RESTS,
         rest=rest,
@@ -74,11 +88,20 @@ def me(context: Ctx, request: Request, choice: PageChoice, back: str = "/") -> R
         zones=sorted(zones()),
         chosen_zone=current().chosen_zone,
         back=within(back),
-        grant=grant,
+        grant=current().grant,
         needed=access_of(request).needed,
         session=COOKIE in request.cookies,
-        tokens=_tokens(context, None if grant is None else grant.user),
+        user=user,
+        tokens=listed_tokens(context, user) if user else [],
+        **shown,
     )
+
+
+def _private(template: str, status: int = 200, **values: Any) -> Response:
+    """A page that no cache keeps: it may show a new token."""
+    response = page(template, status=status, parts=_parts(), **values)
+    response.headers["Cache-Control"] = "no-store"
+    return response
 
 
 @router.post("/me")
@@ -107,30 +130,57 @@ def _fitting_units(given: Mapping[str, str]) -> str:
     )
 
 
-def _tokens(context: Context, user: str | None) -> list[tuple[TokenRecord, TokenState]]:
-    """The tokens of a user with their states; none where nobody is known."""
-    if not user:
-        return []
-    every = _with_states(context, context.store.people.users())
-    return [(token, state) for token, state in every if token.owner == user]
-
-
-def _with_states(context: Context, users: Iterable[UserRecord]) -> list[tuple[TokenRecord, TokenState]]:
-    """Every token with its state."""
-    now, owners = context.store.clock.now(), {user.name: user for user in users}
-    return [(token, token.state_at(now, owners.get(token.owner or ""))) for token in context.store.people.tokens()]
+@router.post("/me/tokens")
+def change_own_tokens(context: Ctx, request: Request, choice: PageChoice, values: Form) -> Response:
+    """Create, renew or revoke a token of the reader; a new secret stands on the page that answers, and nowhere else."""
+    status, shown = _changed(partial(change_token, context, values, every=False), values)
+    return _me(context, request, choice, "/", status, **shown) if shown else _back("/me#tokens")
 
 
 @router.get("/me/users")
-def users(context: Ctx) -> Response:
-    """Every user with role, quotas and tokens."""
+def users(context: Ctx, request: Request, user: Annotated[str, Query(max_length=MAX_USER_NAME)] = "") -> Response:
+    """Every user with role, quotas and tokens, and the form of ``user``."""
+    return _users(context, request, user)
+
+
+@router.post("/me/users")
+def change_users(context: Ctx, request: Request, values: Form) -> Response:
+    """Add or change a user, or do so with a token of anybody (``of`` is "token")."""
+    of_token = values.get("of") == "token"
+    change = partial(change_token, context, values, every=True) if of_token else partial(change_user, context, values)
+    status, shown = _changed(change, values)
+    chosen = "" if of_token or values.get("do") == "add" else values.get("name", "")
+    return _users(context, request, chosen, status, **shown) if shown else _back("/me/users")
+
+
+def _users(context: Context, request: Request, chosen: str, status: int = 200, **shown: Any) -> Response:
     listed = context.store.people.users()
-    return page(
+    return _private(
         "users.html",
-        parts=_parts(),
+        status,
+        part="/me/users",
         users=[user_json(context.store.people, user) for user in listed],
-        tokens=_with_states(context, listed),
+        chosen=next((user for user in listed if user.name == chosen), None),
+        roles=list(Role),
+        tokens=listed_tokens(context),
+        needed=access_of(request).needed,
+        **shown,
     )
+
+
+def _changed(
+    change: Callable[[], tuple[str, TokenRecord] | None], values: Mapping[str, str]
+) -> tuple[int, dict[str, Any]]:
+    """Status and what the page shows of a change: a new token, or what is wrong; nothing of any other."""
+    try:
+        created = change()
+    except FaultError as error:
+        return 422, {"values": values, "faults": {str(fault.where): message(fault) for fault in error.faults}}
+    return 200, {} if created is None else {"created": created, "renewed": values.get("do") == "renew", "grace": GRACE}
+
+
+def _back(address: str) -> Response:
+    return RedirectResponse(address, status_code=303)
 
 
 @router.get("/me/workers")

@@ -32,7 +32,7 @@ from sprag_study.service.storage.tables import ENDED, HELD_AT_DEADLINE, STUDIES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from datetime import datetime
+    from datetime import datetime, timedelta
 
     from sprag_study.service.settings import Settings
 
@@ -232,23 +232,28 @@ class People(Part):
 
         ``owner`` is the user whose token it is; raises UserNotFoundError.
         """
-        secret = TOKEN_PREFIX + secrets.token_urlsafe(_TOKEN_BYTES)
-        values = {
-            "id": f"tk_{secrets.token_hex(6)}",
-            "name": name,
-            "scope": scope.value,
-            "digest": digest_of(secret.encode("ascii")),
-            "created_at": self._now(),
-            "owner": owner,
-            "expires_at": None if expires_at is None else micros_of(expires_at),
-        }
+        ends = None if expires_at is None else micros_of(expires_at)
         with self.session.write() as connection:
-            if owner is not None:
-                require_user(connection, owner)
-            said = {"name": name, "scope": scope.value, "owner": owner}
-            note(connection, self._now(), "token.create", str(values["id"]), **said)
-            row = connection.execute(sa.insert(TOKENS).values(values).returning(TOKENS)).one()
-        return secret, _token_record(row)
+            fields = {"name": name, "scope": scope.value, "owner": owner}
+            return _new_token(connection, self._now(), fields, ends)
+
+    def renew_token(self, token_id: str, grace: timedelta) -> tuple[str, TokenRecord]:
+        """Another token of the same name, scope, owner and length of life; the former is valid for ``grace`` only.
+
+        Returns what `create_token` returns; raises TokenNotFoundError, also for a revoked token, and UserNotFoundError.
+        """
+        c, now = TOKENS.c, self._now()
+        last = micros_of(moment(now) + grace)
+        with self.session.write() as connection:
+            valid = c.revoked_at.is_(None)
+            row = connection.execute(sa.select(TOKENS).where(c.id == token_id, valid)).one_or_none()
+            if row is None:
+                raise TokenNotFoundError(token_id)
+            ends = None if row.expires_at is None else now + row.expires_at - row.created_at
+            earliest = last if row.expires_at is None else min(last, row.expires_at)
+            connection.execute(sa.update(TOKENS).where(c.id == token_id).values(expires_at=earliest))
+            same = {"name": row.name, "scope": row.scope, "owner": row.owner}
+            return _new_token(connection, now, same, ends, instead_of=token_id)
 
     def tokens(self) -> tuple[TokenRecord, ...]:
         """Every token ever created, newest first."""
@@ -318,6 +323,21 @@ def require_user(connection: sa.Connection, name: str, *, removed: bool = False)
     query = sa.select(_U.name).where(_U.name == name, sa.true() if removed else _U.removed_at.is_(None))
     if connection.execute(query).first() is None:
         raise UserNotFoundError(name)
+
+
+def _new_token(
+    connection: sa.Connection, now: int, fields: dict[str, str | None], ends: int | None, **noted: str
+) -> tuple[str, TokenRecord]:
+    """Insert a token of these fields, and note it: its secret and its record."""
+    secret = TOKEN_PREFIX + secrets.token_urlsafe(_TOKEN_BYTES)
+    token_id, owner = f"tk_{secrets.token_hex(6)}", fields["owner"]
+    if owner is not None:
+        require_user(connection, owner)
+    note(connection, now, "token.create", token_id, **fields, **noted)
+    digest = digest_of(secret.encode("ascii"))
+    values = {**fields, "id": token_id, "digest": digest, "created_at": now, "expires_at": ends}
+    row = connection.execute(sa.insert(TOKENS).values(values).returning(TOKENS)).one()
+    return secret, _token_record(row)
 
 
 def _usage(connection: sa.Connection, name: str) -> Usage:

@@ -1,10 +1,30 @@
-"""Scopes of tokens and names of users, apart from their storage, so that the command line starts without it."""
+"""Scopes of tokens, and names of users and tokens, apart from their storage: the command line starts without it."""
 
 from enum import StrEnum
 from typing import Final
 
+from sprag_study.service.faults import parameter_error
+from sprag_study.service.languages import N_, _
+from sprag_study.worker.limits import MAX_NAME_LENGTH
+
 #: Most characters in the name of a user.
 MAX_USER_NAME: Final = 80
+
+
+def user_name(text: str, where: str = "name") -> str:
+    """The name of a new user; raises FaultError about the parameter ``where``."""
+    if not 1 <= len(text) <= MAX_USER_NAME or not text.isprintable() or text != text.strip():
+        allowed = _("1 to {most} printable characters, no blank at either end", most=MAX_USER_NAME)
+        raise parameter_error(where, "invalid-text", N_("is not the name of a user"), text, allowed)
+    return text
+
+
+def token_name(text: str, where: str = "name") -> str:
+    """The name of a new token; raises FaultError about the parameter ``where``."""
+    if not 1 <= len(text) <= MAX_NAME_LENGTH or not text.isprintable() or not text.strip():
+        allowed = _("1 to {most} printable characters in one line", most=MAX_NAME_LENGTH)
+        raise parameter_error(where, "invalid-text", N_("is not the name of a token"), text, allowed)
+    return text
 
 
 class TokenScope(StrEnum):
