@@ -205,6 +205,10 @@ CHANGES: dict[str, tuple[str, Change]] = {
         lambda w: w.post(f"/studies/{swept_study(w.service)}/narrow"),
     ),
     "POST /studies/{study_id}/{verb}": ("study.pause", lambda w: w.post(f"/studies/{w.waiting()}/pause")),
+    "POST /me/tokens": (
+        "token.create",
+        lambda w: w.post("/me/tokens", data={"do": "create", "name": "x", "scope": "read"}),
+    ),
     "POST /nights/new": ("schedule.create", lambda w: w.post("/nights/new", data=_fields(w))),
     "POST /nights/{schedule_id}": (
         "schedule.change",
@@ -224,7 +228,8 @@ def office(settings: Settings, service: Service, connect: Callable[..., httpx.Cl
 
 def test_every_route_that_changes_something_is_walked() -> None:
     changing = {route for route, role in ROLES.items() if role not in {None, Role.VIEWER} and route[:4] != "GET "}
-    assert changing == {*CHANGES}
+    # What administrators change: tests/service/http/web/test_administration.py.
+    assert changing == {*CHANGES, "POST /me/users"}
 
 
 @pytest.mark.parametrize("route", CHANGES)
@@ -239,7 +244,7 @@ def test_every_change_is_in_the_log(office: Office, service: Service, route: str
     assert (entry.address, entry.token) == ("127.0.0.1", office.ids["dora"])
     assert entry.request == answer.headers["x-request-id"]
     made = answer.headers.get("location", "").rpartition("/")[2]
-    assert entry.target[:3] in ("st_", "sc_", "cp_", "vw_")
+    assert entry.target[:3] in ("st_", "sc_", "cp_", "vw_", "tk_")
     assert not made.startswith("st_") or entry.target == made
 
 
