@@ -20,6 +20,7 @@ from sprag_study.service.exports.text import (
     read_table,
     row_json,
     rows_json,
+    stacked,
     table_csv,
 )
 from sprag_study.service.formats import Format
@@ -35,6 +36,7 @@ __all__ = [
     "room_required",
     "row_json",
     "rows_json",
+    "stacked",
     "stored",
     "table_csv",
 ]

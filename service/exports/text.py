@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from sprag_study.service.exports.source import machine
@@ -102,7 +103,19 @@ def csv_pieces(source: Source) -> Iterator[bytes]:
 def table_csv(header: Iterable[str], columns: Iterable[Iterable[object]]) -> bytes:
     """A small table given by its columns, as CSV with the same cells as `csv_pieces`."""
     rows = ([_cell(value) for value in row] for row in zip(*columns, strict=True))
-    return csv_lines(_with_header(list(header), rows))
+    return csv_lines(chain([list(header)], rows))
+
+
+def stacked(parts: Iterable[Mapping[str, Sequence[Any]]]) -> dict[str, list[Any]]:
+    """The columns of tables below each other; a column that a table lacks is empty there."""
+    columns: dict[str, list[Any]] = {}
+    rows = 0
+    for part in parts:
+        count = len(next(iter(part.values())))
+        for name in dict.fromkeys([*columns, *part]):
+            columns.setdefault(name, [None] * rows).extend(part.get(name, [None] * count))
+        rows += count
+    return columns
 
 
 def read_table(columns: Mapping[str, Sequence[Any]], si: Mapping[str, str], units: Units) -> bytes:
@@ -118,11 +131,6 @@ def read_table(columns: Mapping[str, Sequence[Any]], si: Mapping[str, str], unit
 def _headed(name: str, unit: str, known: str) -> str:
     """The head of a column, with its unit where that is not the known one."""
     return name if unit in (known, "") else f"{name} [{unit}]"
-
-
-def _with_header(header: list[str], rows: Iterable[list[Any]]) -> Iterator[list[Any]]:
-    yield header
-    yield from rows
 
 
 def _cell(value: object) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,6 +100,17 @@ class Curve:
     def run(self) -> NDArray[np.intp]:
         """Indices of the cases that were run, ascending, which a picture joins; of a coarser study, its own points."""
         return np.flatnonzero(~not_run(self.endings))
+
+    def fixed(self) -> dict[str, list[Any]]:
+        """Columns of a table with a row for each case: its fixed parameters in words, and its number."""
+        given = in_words({**self.line.by, **self.line.at})
+        cases = self.line.cases.tolist()
+        return {**{path: [value] * len(cases) for path, value in given.items()}, "case": cases}
+
+    def ends(self) -> dict[str, list[Any]]:
+        """The last columns of such a table: the flags of each case, and its ending."""
+        flags = flag_names(self.flags or [""] * len(self.endings))
+        return {"flags": [" ".join(names) for names in flags], "ending": self.endings}
 
     def to_json(self, results: Sequence[ResultInfo]) -> CurveData:
         """The curve as JSON data."""

@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sprag_study.service import exports
-from sprag_study.service.reading.directions import in_words
-from sprag_study.service.results.curves import flag_names
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -57,39 +55,32 @@ def _at(base: Curve, name: str, x: NDArray[np.float64]) -> NDArray[np.float64]:
     """A result of the reference at places ``x``, array of the same shape."""
     order = np.argsort(np.asarray(base.line.x), kind="stable")
     known, values = np.asarray(base.line.x)[order], base.known(name)[order]
-    # Places that differ by rounding only are the same.
-    near = np.clip(np.searchsorted(known, x), 1, max(len(known) - 1, 1)) if len(known) > 1 else np.ones(len(x), int)
-    left, right = near - 1, np.minimum(near, len(known) - 1)
-    width = known[right] - known[left]
-    share = np.divide(x - known[left], width, out=np.zeros(len(x)), where=width > 0.0)
-    share = np.where(np.abs(share) < 1e-9, 0.0, np.where(np.abs(share - 1.0) < 1e-9, 1.0, share))
-    outside = (share < 0.0) | (share > 1.0) | ((width == 0.0) & ~np.isclose(x, known[left], rtol=1e-9, atol=0.0))
-    between = values[left] + share * (values[right] - values[left])
-    found: NDArray[np.float64] = np.where(share == 0.0, values[left], np.where(share == 1.0, values[right], between))
-    return np.where(outside, np.nan, found)
+    # Places that differ by rounding only are the same; numpy joins others by a line between their neighbours.
+    after = np.searchsorted(known, x)
+    low, high = known[np.maximum(after - 1, 0)], known[np.minimum(after, len(known) - 1)]
+    nearest = np.where(x - low < high - x, low, high)
+    x = np.where(np.isclose(x, nearest, rtol=1e-9, atol=1e-12 * float(np.ptp(known))), nearest, x)
+    return np.interp(x, known, values, left=np.nan, right=np.nan)
 
 
 def compared_csv(drawn: Sequence[tuple[str, Curves]], reading: Reading) -> bytes:
     """Every point of every curve as one row: study, fixed parameters, case, x, results, ending."""
-    columns: dict[str, list[Any]] = {"study": []}
     units: dict[str, str] = {}
+    for _label, curves in drawn:
+        units |= {**curves.selection.units, **{info.name: info.unit for info in curves.selection.results}}
+    return exports.read_table(exports.stacked(_tables(drawn)), units, reading.units)
+
+
+def _tables(drawn: Sequence[tuple[str, Curves]]) -> Iterator[dict[str, list[Any]]]:
+    """The columns of each curve."""
     for label, curves in drawn:
-        chosen = curves.selection
-        units |= {**chosen.units, **{info.name: info.unit for info in chosen.results}}
         for curve in curves.curves:
             points = len(curve.endings)
-            parts: dict[str, list[Any]] = {
+            yield {
                 "study": [label] * points,
-                **{path: [value] * points for path, value in in_words({**curve.line.by, **curve.line.at}).items()},
-                "case": curve.line.cases.tolist(),
-                chosen.x: list(curve.line.x),
-                **{info.name: curve.y[info.name].tolist() for info in chosen.results},
+                **curve.fixed(),
+                curves.selection.x: list(curve.line.x),
+                **{info.name: curve.y[info.name].tolist() for info in curves.selection.results},
                 **({} if curve.regimes is None else {"regime": curve.regimes}),
-                "flags": [" ".join(names) for names in flag_names(curve.flags or [""] * points)],
-                "ending": curve.endings,
+                **curve.ends(),
             }
-            rows = len(columns["study"])
-            for name in dict.fromkeys([*columns, *parts]):
-                # A parameter that is not fixed in every study is empty in the others.
-                columns.setdefault(name, [None] * rows).extend(parts.get(name, [None] * points))
-    return exports.read_table(columns, units, reading.units)

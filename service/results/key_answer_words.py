@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from sprag_study.sentences import Amount, Name
 from sprag_study.service import exports
+from sprag_study.service.answers import filled
 from sprag_study.service.answers.key import AnswerFacts, AnswerReport, AnswerValue, CurveAnswer, OverallAnswer
 from sprag_study.service.languages import available, language
 from sprag_study.service.reading.catalogue import unit_of
@@ -119,30 +120,18 @@ def answer_json(found: Found, x_unit: str) -> AnswerValue:
 
 def answer_facts(found: Found) -> AnswerFacts:
     """What is known of one answer."""
-    return {
-        "name": found.answer.name,
-        "title": found.answer.title,
-        "kind": found.answer.kind,
-        "result": found.info.name,
-        "result_unit": found.info.unit,
-        "unit": found.unit,
-        "description": found.info.description,
-        "value": found.value,
-        "x": found.x,
-        "low": found.low,
-        "high": found.high,
-        "above": found.above,
-        "there": found.there,
-        "edge": found.edge,
-        "interpolated": found.interpolated,
-        "cases": [case for case in (found.case, found.other) if case is not None],
-        "of_cases": found.cases,
-        "half_width": found.half_width,
-        "error": found.error,
-        "regime": found.regime,
-        "flags": list(found.flags),
-        "why": found.why,
-    }
+    return filled(
+        AnswerFacts,
+        found,
+        name=found.answer.name,
+        title=found.answer.title,
+        kind=found.answer.kind,
+        result=found.info.name,
+        result_unit=found.info.unit,
+        description=found.info.description,
+        cases=[case for case in (found.case, found.other) if case is not None],
+        of_cases=found.cases,
+    )
 
 
 def _overall(study: Study, found: Found) -> OverallAnswer:
@@ -152,15 +141,8 @@ def _overall(study: Study, found: Found) -> OverallAnswer:
 
 def answers_csv(study: Study, found: StudyAnswers, reading: Reading) -> bytes:
     """A row for each answer of each curve, in a reader's units: of the value that in the column ``unit``."""
-    columns: dict[str, list[Any]] = {}
-    rows = list(_rows(study, found, reading))
-    for row in rows:
-        for name in row:
-            columns.setdefault(name, [])
-    for row in rows:
-        for name, column in columns.items():
-            column.append(row.get(name))
-    return exports.table_csv(list(columns), list(columns.values()))
+    columns = exports.stacked({name: [value] for name, value in row.items()} for row in _rows(study, found, reading))
+    return exports.table_csv(columns, columns.values())
 
 
 def _rows(study: Study, found: StudyAnswers, reading: Reading) -> Iterator[dict[str, Any]]:

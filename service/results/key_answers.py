@@ -202,39 +202,29 @@ def find_answers(
     if query is None:
         if point:
             raise refused("point", "not-used", "the cases of this study lie on no curves", point, allowed="no point")
-        curves = (_single(study, answers, by_name, fetch),) if study.cases == 1 else ()
-        return StudyAnswers(None, None, "1", curves, () if study.cases == 1 else overall, None)
+        single = (_single(study, answers, by_name, fetch),) if study.cases == 1 else ()
+        return StudyAnswers(None, None, "1", single, () if single else overall, None)
     x = read_point(study, query, point)
     names = dict.fromkeys([*query.y, *(one.result for one in answers)])
     drawn = draw(select(study, replace(query, y=tuple(models.with_half_widths(names, by_name)))), fetch)
-    found = []
-    for curve in drawn.curves:
-        reader = _Reader(curve, query.x, x)
-        main = (Answer(name, name, name, "here") for name in query.y)
-        found.append(
-            CurveAnswers(
-                curve.line,
-                tuple(reader.read(one, by_name[one.result], drawn) for one in answers if _fits(study, one, query.x)),
-                tuple(reader.read(one, by_name[one.result], drawn) for one in main),
-            )
-        )
+    curves = tuple(answers_at(study, query, curve, x) for curve in drawn.curves)
     shown_only = replace(drawn.selection, results=tuple(by_name[name] for name in query.y))
-    return StudyAnswers(query, x, unit_of(study, query.x), tuple(found), overall, replace(drawn, selection=shown_only))
+    return StudyAnswers(query, x, unit_of(study, query.x), curves, overall, replace(drawn, selection=shown_only))
 
 
-def answers_at(study: Study, found: StudyAnswers, place: int, x: float) -> CurveAnswers:
-    """The answers of the curve at ``place`` of those ``found`` that are drawn, at another working point of it."""
-    assert found.query is not None
-    assert found.drawn is not None
-    by_name = models.results_by_name(study)
-    reader = _Reader(found.drawn.curves[place], found.query.x, x)
-    main = (Answer(name, name, name, "here") for name in found.query.y)
-    every = (one for one in answers_of_model(study) if _fits(study, one, found.query.x))
-    return CurveAnswers(
-        found.curves[place].line,
-        tuple(reader.read(one, by_name[one.result], found.drawn) for one in every),
-        tuple(reader.read(one, by_name[one.result], found.drawn) for one in main),
+def answers_at(study: Study, query: CurveQuery, curve: Curve, x: float | None) -> CurveAnswers:
+    """The answers of a curve at a working point of it."""
+    reader, by_name = _Reader(study, curve, query.x, x), models.results_by_name(study)
+    fitting = (one for one in answers_of_model(study) if _fits(study, one, query.x))
+    answers, here = (
+        tuple(reader.read(one, by_name[one.result]) for one in every) for every in (fitting, map(_here, query.y))
     )
+    return CurveAnswers(curve.line, answers, here)
+
+
+def _here(name: str) -> Answer:
+    """The answer that a result is at the working point."""
+    return Answer(name, name, name, "here")
 
 
 def usual_curve(study: Study, found: StudyAnswers) -> int:
@@ -260,23 +250,18 @@ def _single(
     fetch: Fetch,
 ) -> CurveAnswers:
     """The main results of the only case."""
-    main = [Answer(name, name, name, "here") for name in main_results(study)]
+    main = list(map(_here, main_results(study)))
     here = [one for one in answers if one.kind == "here"]
     names = dict.fromkeys(one.result for one in (*main, *here))
     columns = fetch(np.zeros(1, dtype=np.int64), models.with_half_widths(names, by_name))
     line = Line({}, {}, (0.0,), np.zeros(1, dtype=np.int64))
 
     def one(answer: Answer) -> Found:
-        info, value = by_name[answer.result], float(columns.values[answer.result][0])
-        usable = models.usable(study.model, columns.endings, columns.flags, info.name)
-        known, why = math.isfinite(value) and bool(usable[0]), _why(np.array([value]), columns.endings)
-        width = columns.values.get(models.half_width(info.name), np.array([np.nan]))[0]
-        return Found(
-            answer, info, info.unit, value if known else None, None if known else why,
-            case=0, cases=1,
-            flags=_split(columns.flags, [0]),
-            half_width=float(width) if known and np.isfinite(width) else None,
-        )  # fmt: skip
+        info, value = by_name[answer.result], columns.values[answer.result]
+        if math.isfinite(value[0]) and models.usable(study.model, columns.endings, columns.flags, info.name)[0]:
+            return _of_case(answer, info, columns, 0, cases=1)
+        why = _why(value, columns.endings)
+        return Found(answer, info, info.unit, why=why, case=0, cases=1, flags=_split(columns.flags, [0]))
 
     return CurveAnswers(line, tuple(map(one, here)), tuple(map(one, main)))
 
@@ -297,16 +282,21 @@ def _overall(study: Study, answers: Sequence[Answer], by_name: dict[str, ResultI
             yield Found(answer, info, info.unit, why=_why(values, columns.endings))
             continue
         place = int(kept[_best(values[kept], answer)])
-        width = columns.values.get(models.half_width(info.name), np.full(values.size, np.nan))[place]
         kind = None if regime is None else regime.cell(float(columns.values[regime.name][place]))
-        yield Found(
-            answer, info, info.unit, float(values[place]),
-            case=int(columns.cases[place]),
-            cases=kept.size,
-            regime=None if kind is None else str(kind),
-            flags=_split(columns.flags, [place]),
-            half_width=float(width) if np.isfinite(width) else None,
-        )  # fmt: skip
+        found = _of_case(answer, info, columns, place, cases=kept.size)
+        yield found if kind is None else replace(found, regime=str(kind))
+
+
+def _of_case(answer: Answer, info: ResultInfo, columns: CaseColumns, place: int, cases: int) -> Found:
+    """The value that the case at a place of the columns has, the best of so many cases."""
+    width = columns.values.get(models.half_width(info.name), np.full(place + 1, np.nan))[place]
+    return Found(
+        answer, info, info.unit, float(columns.values[info.name][place]),
+        case=int(columns.cases[place]),
+        cases=cases,
+        flags=_split(columns.flags, [place]),
+        half_width=float(width) if np.isfinite(width) else None,
+    )  # fmt: skip
 
 
 def _why(values: NDArray[np.float64], endings: Sequence[str | None]) -> Why:
@@ -326,12 +316,12 @@ def _split(flags: Sequence[str], places: Sequence[int]) -> tuple[str, ...]:
 class _Reader:
     """Reads answers off one curve."""
 
-    def __init__(self, curve: Curve, path: str, point: float | None) -> None:
-        self._curve, self._path, self._point = curve, path, point
+    def __init__(self, study: Study, curve: Curve, path: str, point: float | None) -> None:
+        self._curve, self._unit, self._point = curve, unit_of(study, path), point
         self._x = np.asarray(curve.line.x, dtype=np.float64)
         self._flags = curve.flags or []
 
-    def read(self, answer: Answer, info: ResultInfo, drawn: Curves) -> Found:
+    def read(self, answer: Answer, info: ResultInfo) -> Found:
         """One answer."""
         way: dict[str, Callable[[Answer, ResultInfo], Found]] = {
             "at_zero": self._at_zero,
@@ -340,7 +330,7 @@ class _Reader:
         }
         found = way.get(answer.kind, self._extreme)(answer, info)
         if answer.kind == "until_zero":
-            found = replace(found, unit=drawn.selection.units[self._path])
+            found = replace(found, unit=self._unit)
         refined = self._curve.refined
         exact = found.answer.kind in ("here", "at_zero", "until_zero") and not found.interpolated
         return found if refined is None or exact else replace(found, error=refined.errors.get(info.name))

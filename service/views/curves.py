@@ -14,7 +14,6 @@ from sprag_study.service.figures.curves import curves_figure
 from sprag_study.service.figures.pictures import draw_map
 from sprag_study.service.figures.read import read_map
 from sprag_study.service.json_text import numbers
-from sprag_study.service.reading.directions import in_words
 from sprag_study.service.results.choice import held
 from sprag_study.service.results.curve_cases import check_map, select
 from sprag_study.service.results.curves import CurveQuery, Curves, Map, flag_names
@@ -28,7 +27,7 @@ from sprag_study.service.views.study_view import StudyAnswer, StudyView
 from sprag_study.worker import models
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
     from sprag_study.service.figures.figure import Figure
     from sprag_study.service.reading.reader import Reading
@@ -113,24 +112,19 @@ class CurvesView(StudyView[CurvesQuestion, CurveQuery, Curves]):
         jumps between this point and the next.
         """
         curves = answer.result
-        names = kind_columns(curves.selection.regime)
-        columns: dict[str, list[Any]] = {}
-        for curve in curves.curves:
-            points = len(curve.endings)
-            kinds: Iterable[tuple[str, list[Any]]] = zip(names, (curve.regimes or [], curve.orders or []), strict=False)
-            parts: dict[str, list[Any]] = {
-                **{path: [value] * points for path, value in in_words({**curve.line.by, **curve.line.at}).items()},
-                "case": curve.line.cases.tolist(),
+        names, infos = kind_columns(curves.selection.regime), curves.selection.results
+        columns = exports.stacked(
+            {
+                **curve.fixed(),
                 curves.selection.x: list(curve.line.x),
-                **{info.name: numbers(curve.y[info.name], info.kind == "count") for info in curves.selection.results},
-                **dict(kinds),
+                **{info.name: numbers(curve.y[info.name], info.kind == "count") for info in infos},
+                **dict(zip(names, (curve.regimes or [], curve.orders or []), strict=False)),
                 **_jumped(curve),
-                **_not_joined(curve, [info.name for info in curves.selection.results]),
-                "flags": [" ".join(names) for names in flag_names(curve.flags or [""] * points)],
-                "ending": curve.endings,
+                **_not_joined(curve, [info.name for info in infos]),
+                **curve.ends(),
             }
-            for name, part in parts.items():
-                columns.setdefault(name, []).extend(part)
+            for curve in curves.curves
+        )
         units = {**curves.selection.units, **{info.name: info.unit for info in curves.selection.results}}
         return exports.read_table(columns, units, reading.units)
 

@@ -154,7 +154,7 @@ def along_headline(study: Study, found: StudyAnswers, name: str = "", *, asked: 
     if spot is None:
         return Headline(of=of)
     own = Along(study, curve, found.query.x, *spot)
-    answers = answers_at(study, found, place, spot[0])
+    answers = answers_at(study, found.query, curve, spot[0])
     gap = None
     if len(spot[1]) == 2:
         low, high = (float(curve.line.x[at]) for at in spot[1])
@@ -300,12 +300,8 @@ def _number(found: Found, x_unit: str, own: Along | None) -> KeyNumber:
     """An answer as a key number; between two cases of its ``own`` curve what both of them have."""
     if found.answer.kind == "until_zero" and found.value is not None:
         return _stall(found)
-    value = None if found.value is None else found.value
-    unit, count = found.info.unit, digits(value or 0.0, found.half_width)
-    made = KeyNumber(
-        found.answer.title, value, unit, count, note=_doubt(found), case=found.case, better=found.answer.better
-    )
-    if value is None:
+    made = _key(found, _doubt(found))
+    if found.value is None:
         return made
     made = replace(made, where=_where(found, x_unit))
     if found.other is None:
@@ -314,6 +310,14 @@ def _number(found: Found, x_unit: str, own: Along | None) -> KeyNumber:
         return replace(made, value=None)
     ends = sorted(own.value(place, found.info.name) for place in own.places)
     return replace(made, value=None, low=ends[0], high=ends[-1])
+
+
+def _key(found: Found, note: Phrase) -> KeyNumber:
+    """The value of an answer as a key number."""
+    answer, count = found.answer, digits(found.value or 0.0, found.half_width)
+    return KeyNumber(
+        answer.title, found.value, found.info.unit, count, note=note, case=found.case, better=answer.better
+    )
 
 
 def _where(found: Found, x_unit: str) -> Phrase:
@@ -368,7 +372,4 @@ def _no_curve(study: Study, found: StudyAnswers) -> Headline:
 
 
 def _plain(item: Found) -> KeyNumber:
-    value = item.value or 0.0
-    note = note_of(answer_facts(item), "1") if item.flags or item.regime else NOTHING
-    unit, count = item.info.unit, digits(value, item.half_width)
-    return KeyNumber(item.answer.title, value, unit, count, note=note, case=item.case, better=item.answer.better)
+    return _key(item, note_of(answer_facts(item), "1") if item.flags or item.regime else NOTHING)

@@ -12,6 +12,8 @@ from sprag_study.service.json_text import numbers
 from sprag_study.service.reading.catalogue import unit_of
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from sprag_study.service.answers.tolerances import (
         CausesInfo,
         ConditionInfo,
@@ -107,24 +109,22 @@ def percent(probability: float) -> str:
 
 def ribbon_csv(found: Ribbon, shown: Units) -> bytes:
     """A row for each place: parameters, the nominal case and its results, quantiles with their intervals, counts."""
-    columns: dict[str, list[Any]] = {}
     units = dict(found.places.units)
-    of_result = {info.name: info.unit for info in found.results}
+    parts = []
     for one in found.lines:
-        parts = _place_columns(found.places, one)
-        for name, spread in one.spreads.items():
-            parts[f"{name} nominal"] = numbers(spread.nominal)
-            parts[f"{name} drives"] = spread.quantiles.drives.tolist()
+        part = _place_columns(found.places, one)
+        for info in found.results:
+            name, spread = info.name, one.spreads[info.name]
+            own = {f"{name} nominal": spread.nominal}
+            part |= {f"{name} nominal": [], f"{name} drives": spread.quantiles.drives.tolist()}
             for index, probability in enumerate(found.probabilities):
-                heading = f"{name} {percent(probability)}"
-                parts[heading] = numbers(spread.quantiles.values[index])
-                parts[f"{heading} low"] = numbers(spread.quantiles.low[index])
-                parts[f"{heading} high"] = numbers(spread.quantiles.high[index])
-                units |= dict.fromkeys((heading, f"{heading} low", f"{heading} high"), of_result[name])
-            units[f"{name} nominal"] = of_result[name]
-        for name, part in parts.items():
-            columns.setdefault(name, []).extend(part)
-    return exports.read_table(columns, units, shown)
+                for end in ("values", "low", "high"):
+                    heading = f"{name} {percent(probability)} {end}".removesuffix(" values")
+                    own[heading] = getattr(spread.quantiles, end)[index]
+            part |= {heading: numbers(values) for heading, values in own.items()}
+            units |= dict.fromkeys(own, info.unit)
+        parts.append(part)
+    return exports.read_table(exports.stacked(parts), units, shown)
 
 
 def _place_columns(places: Places, one: RibbonLine | YieldLine) -> dict[str, list[Any]]:
@@ -208,18 +208,15 @@ def _finite(value: float) -> float | None:
 
 def yield_csv(found: Yield, shown: Units) -> bytes:
     """A row for each place with its yield; of each line a last row, without a case, for all its places together."""
-    columns: dict[str, list[Any]] = {}
+    return exports.read_table(exports.stacked(_yield_columns(found)), found.places.units, shown)
+
+
+def _yield_columns(found: Yield) -> Iterator[dict[str, list[Any]]]:
+    """The columns of each line."""
     for one in found.lines:
-        parts = _place_columns(found.places, one)
-        rows = [*range(one.line.cases.size)]
+        part, fixed = _place_columns(found.places, one), {**one.line.by, **one.line.at}
+        part = {name: [*column, fixed.get(name)] for name, column in part.items()}
         for name in ("reached", "drives", "value", "low", "high"):
-            values = getattr(one.each, name)
-            whole = getattr(one.whole, name).item()
-            parts["yield" if name == "value" else name] = [*numbers(values[rows]), whole]
-        parts["nominal"] = [*one.nominal.tolist(), bool(one.nominal.all())]
-        fixed = {**one.line.by, **one.line.at}
-        for name, part in parts.items():
-            if len(part) == len(rows):
-                part.append(fixed.get(name))
-            columns.setdefault(name, []).extend(part)
-    return exports.read_table(columns, found.places.units, shown)
+            values, whole = getattr(one.each, name), getattr(one.whole, name).item()
+            part["yield" if name == "value" else name] = [*numbers(values), whole]
+        yield {**part, "nominal": [*one.nominal.tolist(), bool(one.nominal.all())]}
