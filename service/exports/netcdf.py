@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag_study.service.exports.source import Source
+    from sprag_study.worker.arrays import Floats, Ints
     from sprag_study.worker.models import ResultInfo
     from sprag_study.worker.study import Axis, Study
 
@@ -144,7 +145,7 @@ class _Grid:
         )
         return {**found, _CASE: numbers}
 
-    def _derived(self) -> dict[str, NDArray[np.float64]]:
+    def _derived(self) -> dict[str, Floats]:
         """The derived parameters of every case."""
         parts = [self._study.columns(cases) for cases in blocks(self._study)] if self._study.derive else []
         return {path: np.concatenate([part[path] for part in parts]) for path in self._study.derive}
@@ -189,7 +190,7 @@ def _flag_attributes() -> dict[str, Any]:
     }
 
 
-def _variable(info: ResultInfo, column: NDArray[np.float64]) -> tuple[NDArray[Any], dict[str, Any]]:
+def _variable(info: ResultInfo, column: Floats) -> tuple[NDArray[Any], dict[str, Any]]:
     """Values and attributes of a result; a category becomes codes, the first of which means none."""
     if info.kind != "category":
         return column, _attributes(info.name, info.unit, info.description)
@@ -232,12 +233,12 @@ class _Columns:
         finally:
             os.close(file)
 
-    def _note(self, cases: NDArray[np.int64], endings: list[str], flags: list[str]) -> None:
+    def _note(self, cases: Ints, endings: list[str], flags: list[str]) -> None:
         self.endings[cases] = [ENDING_CODES[ending] for ending in endings]
         masks = {text: flags_mask(text) for text in set(flags)}
         self.flags[cases] = [masks[text] for text in flags]
 
-    def column(self, index: int) -> NDArray[np.float64]:
+    def column(self, index: int) -> Floats:
         """One result of all cases, NaN where there is none."""
         column = np.full(self._cases, np.nan)
         with self._path.open("rb") as file:

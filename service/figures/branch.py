@@ -14,8 +14,7 @@ from sprag_study.service.reading.reader import Phrase, joined, plural, term
 from sprag_study.service.results.selection import axis_name
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from sprag_study.worker.arrays import Bools, Floats, Ints
     from sprag_study.worker.models.branches import Along, CaseBranch, SpecialPoint
     from sprag_study.worker.study import Study
 
@@ -32,9 +31,9 @@ _LISTED: Final = 12
 class OwnCases:
     """The cases of the study along the branch's parameter: values (SI), results and numbers, shape (m,)."""
 
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    cases: NDArray[np.int64]
+    x: Floats
+    y: Floats
+    cases: Ints
 
 
 def branch_figure(made: CaseBranch, study: Study, along: Along, result: str, own: OwnCases | None = None) -> Figure:
@@ -64,21 +63,19 @@ def branch_figure(made: CaseBranch, study: Study, along: Along, result: str, own
     return Figure(x, (Panel(y, tuple(lines), x=x),), heading=heading, below=_below(made))
 
 
-def stable_segments(made: CaseBranch) -> NDArray[np.bool_]:
+def stable_segments(made: CaseBranch) -> Bools:
     """Whether the part between each point and the next one is stable, shape (points - 1,).
 
     At folds and the like a multiplier is 1 in modulus: the other end of a part decides.
     """
     marginal = np.zeros(len(made.stable), dtype=np.bool_)
     marginal[[special.index for special in made.specials if special.kind != "grazing"]] = True
-    stable: NDArray[np.bool_] = made.stable | marginal
+    stable: Bools = made.stable | marginal
     both = marginal[:-1] & marginal[1:]
     return np.asarray(stable[:-1] & stable[1:] & ~both)
 
 
-def _part(
-    x: NDArray[np.float64], y: NDArray[np.float64], kept: NDArray[np.bool_]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _part(x: Floats, y: Floats, kept: Bools) -> tuple[Floats, Floats]:
     """The kept segments of a line, with NaN between stretches."""
     xs: list[float] = []
     ys: list[float] = []
@@ -94,7 +91,7 @@ def _part(
     return np.array(xs), np.array(ys)
 
 
-def _marks(made: CaseBranch, values: NDArray[np.float64], unit: str) -> list[Line]:
+def _marks(made: CaseBranch, values: Floats, unit: str) -> list[Line]:
     """A ring for each special point, named in the legend; many of them by their kinds."""
     if len(made.specials) <= _LISTED:
         groups = {special_text(special, unit): [special] for special in made.specials}

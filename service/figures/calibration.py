@@ -15,9 +15,8 @@ from sprag_study.worker.planning.calibrate.candidates import along, groups
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
-
     from sprag_study.service.results.calibration import Calibration
+    from sprag_study.worker.arrays import Floats, Ints
 
 _NOTHING: Final = Phrase("The first fit has not ended yet.")
 #: Dashes of a fitted curve, and of the ends of its intervals.
@@ -44,16 +43,16 @@ def _quantity(found: Calibration, path: str) -> Quantity:
     return Quantity(path, unit_of(found.study, path))
 
 
-def _places(found: Calibration, rows: NDArray[np.int64]) -> NDArray[np.float64]:
+def _places(found: Calibration, rows: Ints) -> Floats:
     """Where measured values are drawn: at their condition, or by their number where there is none."""
     x = along(found.plan)
     if x is None:
         return rows.astype(np.float64) + 1.0
-    column: NDArray[np.float64] = found.plan.at[found.plan.places[0][rows], x]
+    column: Floats = found.plan.at[found.plan.places[0][rows], x]
     return column
 
 
-def _curves(found: Calibration, column: int) -> Iterator[tuple[int, str, str, NDArray[np.int64]]]:
+def _curves(found: Calibration, column: int) -> Iterator[tuple[int, str, str, Ints]]:
     """Number, name, colour and measured values of each curve."""
     values, which = groups(found.plan)
     conditions, columns = found.plan.places

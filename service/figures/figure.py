@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sprag_study.service.languages import gettext
 from sprag_study.service.reading.reader import Phrase
+from sprag_study.worker.arrays import Floats, Ints
 
 #: Colours of lines on white paper, with a contrast of at least 4.5 : 1; pages have others on dark ground. Markers,
 #: dashes and names repeat what they tell apart.
@@ -59,17 +59,17 @@ class Line:
     """
 
     name: str
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
+    x: Floats
+    y: Floats
     colour: str
     style: int = 0
     key: str = ""
     heading: str = ""
     listed: bool = True
-    cases: NDArray[np.int64] | None = None
-    stretches: tuple[NDArray[np.int64], ...] | None = None
+    cases: Ints | None = None
+    stretches: tuple[Ints, ...] | None = None
     joined: bool = True
-    shades: NDArray[np.float64] | None = None
+    shades: Floats | None = None
     ring: bool = False
     wide: bool = False
 
@@ -88,9 +88,9 @@ class Marks:
     """Points of one regime, drawn on the lines; ``x``, ``y`` and ``cases`` have the shape (m,)."""
 
     regime: str
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    cases: NDArray[np.int64]
+    x: Floats
+    y: Floats
+    cases: Ints
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,9 +108,9 @@ class Fill:
     """The area between two lines over the same x, behind all lines; arrays of shape (m,), NaN is a gap."""
 
     name: str
-    x: NDArray[np.float64]
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
+    x: Floats
+    low: Floats
+    high: Floats
     colour: str
     key: str = ""
     listed: bool = True

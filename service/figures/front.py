@@ -14,9 +14,8 @@ from sprag_study.service.reading.reader import Phrase, plural
 from sprag_study.service.results.fronts import history, worst_of
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from sprag_study.service.results.fronts import Designs
+    from sprag_study.worker.arrays import Bools, Floats
 
 #: The number of a design, as an axis.
 NUMBER: Final = "design"
@@ -27,7 +26,7 @@ _FEW: Final = 5
 _NOTHING: Final = Phrase("No design has its results yet.")
 
 
-def quantities(found: Designs) -> dict[str, tuple[str, NDArray[np.float64]]]:
+def quantities(found: Designs) -> dict[str, tuple[str, Floats]]:
     """What a design can be drawn over, by name: unit and values; goals first, then variables, results of limits."""
     names = [goal.name for goal in found.plan.best]
     shown = {name: (found.infos[name].unit, found.front.goals[:, index]) for index, name in enumerate(names)}
@@ -92,7 +91,7 @@ def front_figure(found: Designs, x: str | None = None, y: str | None = None) -> 
     return Figure(across, (panel,), note=note, below=below, most=20_000)
 
 
-def _near(values: NDArray[np.float64], feasible: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _near(values: Floats, feasible: Bools) -> Bools:
     """Which values are within the range of the feasible ones, or as much as that beyond; all where few are feasible."""
     known = values[feasible & np.isfinite(values)]
     if known.size < _FEW or np.ptp(known) == 0.0:

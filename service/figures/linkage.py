@@ -16,9 +16,8 @@ from sprag_study.worker.models import machine_shaft
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from numpy.typing import NDArray
+    from sprag_study.worker.arrays import Floats
 
-    Floats = NDArray[np.float64]
     Place = tuple[float, float]
 
 #: Degrees of the shaft from one frame to the next.

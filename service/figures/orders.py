@@ -15,9 +15,8 @@ from sprag_study.service.results.regimes import MARKS, ORDER
 from sprag_study.service.results.sweeps import values_text
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from sprag_study.service.results.curves import Curve, Map
+    from sprag_study.worker.arrays import Floats
 
 Look = tuple[str, str]
 Span = tuple[str, float, float]
@@ -40,7 +39,7 @@ _DARKEST: Final = 32
 _PATTERNS: Final = {"held": "-", "coasting": ".", "irregular": "x", "unsettled": "+"}
 
 
-def edges(values: Sequence[float] | NDArray[np.float64], *, whole: bool = False) -> NDArray[np.float64]:
+def edges(values: Sequence[float] | Floats, *, whole: bool = False) -> Floats:
     """Borders of the cells around ascending values, one more than there are values.
 
     The outer cells end at the outer values, as curves do, unless they are ``whole``, with the values inside.
@@ -56,14 +55,14 @@ def edges(values: Sequence[float] | NDArray[np.float64], *, whole: bool = False)
     return np.concatenate([first, between, last])
 
 
-def map_edges(drawn: Map) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def map_edges(drawn: Map) -> tuple[Floats, Floats]:
     """Borders of the cells of a map along x and y; squares of a refined map are whole."""
     if drawn.refined is None:
         return edges(drawn.x_values, whole=True), edges(drawn.y_values, whole=True)
     return _even(np.array(drawn.x_values)), _even(np.array(drawn.y_values))
 
 
-def _even(middles: NDArray[np.float64]) -> NDArray[np.float64]:
+def _even(middles: Floats) -> Floats:
     """Borders of even squares with these middles."""
     step = middles[1] - middles[0]
     return np.concatenate([middles - step / 2.0, middles[-1:] + step / 2.0])
@@ -118,7 +117,7 @@ def strip_of(curves: Sequence[Curve], units: Mapping[str, str]) -> tuple[dict[st
     return (rows, looks) if set(looks) - {"1 period"} else ({}, {})
 
 
-def _spans(names: Sequence[str | None], borders: NDArray[np.float64]) -> Iterator[Span]:
+def _spans(names: Sequence[str | None], borders: Floats) -> Iterator[Span]:
     start = 0
     for place in range(1, len(names) + 1):
         if place == len(names) or names[place] != names[start]:
@@ -140,7 +139,7 @@ class OrderMap:
     """
 
     looks: dict[str, Look]
-    places: NDArray[np.float64]
+    places: Floats
     names: list[list[str | None]]
 
     @property

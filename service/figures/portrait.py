@@ -12,8 +12,7 @@ from sprag_study.service.reading.reader import Phrase, part_label, plural, term
 from sprag_study.worker import models
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from sprag_study.worker.arrays import Floats
     from sprag_study.worker.models import Portrait, Presentation, Trajectory
 
 #: Approximate number of points of all orbits of a figure together.
@@ -91,18 +90,18 @@ def _along(made: Portrait, lines: list[tuple[str, str]]) -> Iterator[Line]:
         )
 
 
-def _column(made: Trajectory, name: str) -> NDArray[np.float64]:
+def _column(made: Trajectory, name: str) -> Floats:
     """Values of a variable, shape (times,)."""
-    values: NDArray[np.float64] = made.values[:, made.names.index(name)]
+    values: Floats = made.values[:, made.names.index(name)]
     return values
 
 
-def _periods(strobes: Trajectory) -> NDArray[np.float64]:
+def _periods(strobes: Trajectory) -> Floats:
     """Number of the excitation period at whose end each strobe lies, from 1."""
     if strobes.times.size < 2:
         return np.arange(1.0, strobes.times.size + 1.0)
     period = (strobes.times[-1] - strobes.times[0]) / (strobes.times.size - 1)
-    periods: NDArray[np.float64] = np.rint(strobes.times / period)
+    periods: Floats = np.rint(strobes.times / period)
     return periods
 
 

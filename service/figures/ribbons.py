@@ -18,13 +18,10 @@ from sprag_study.service.results.tolerances.written import percent
 from sprag_study.worker.models import ResultInfo
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from sprag_study.service.results.tolerances.batch import Places
     from sprag_study.service.results.tolerances.ribbons import Ribbon, RibbonLine
     from sprag_study.service.results.tolerances.yields import Yield
-
-    Numbers = NDArray[np.float64]
+    from sprag_study.worker.arrays import Floats
 
 _NOTHING: Final = Phrase("No drive has this result yet.")
 #: Dashes of the nominal drive, and of quantiles other than that in the middle.
@@ -199,7 +196,7 @@ def yield_map(found: Yield) -> Map:
     return _map(found.places, shown, 100.0 * np.array([one.each.value for one in found.lines]))
 
 
-def _map(places: Places, shown: ResultInfo, values: Numbers) -> Map:
+def _map(places: Places, shown: ResultInfo, values: Floats) -> Map:
     by = list(places.lines[0].by)
     if places.x is None or len(by) != 1:
         raise refused("by", "required", "a map needs an axis x and another one", by, allowed="one axis")

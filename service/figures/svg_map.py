@@ -37,12 +37,9 @@ from sprag_study.service.results.regimes import MARKS
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from numpy.typing import NDArray
-
     from sprag_study.service.figures.figure import Quantity
     from sprag_study.service.results.curves import Map
-
-    Numbers = NDArray[np.float64]
+    from sprag_study.worker.arrays import Floats, Ints
 
 #: Height of a map, and the same as a share of the width of a narrow one.
 _HIGH: Final = 400.0
@@ -140,7 +137,7 @@ class _MapPainting(Painting):
         yield element("rect", width=self._plot, height=self._high, fill="none", stroke="var(--edge)")
         yield y_numbers(ticks, heights, -9.0)
 
-    def _colours(self, known: Numbers) -> tuple[NDArray[np.int64], list[str]]:
+    def _colours(self, known: Floats) -> tuple[Ints, list[str]]:
         """Which colour each cell has, -1 for none, and the colours."""
         there = np.isfinite(known)
         if self._orders is not None:
@@ -152,7 +149,7 @@ class _MapPainting(Painting):
             places[there] = np.minimum((shares * _COLOURS).astype(np.int64), _COLOURS - 1)
         return places, [shade((place + 0.5) / _COLOURS) for place in range(_COLOURS)]
 
-    def _cells(self, known: Numbers, painted: tuple[NDArray[np.int64], list[str]]) -> Iterator[str]:
+    def _cells(self, known: Floats, painted: tuple[Ints, list[str]]) -> Iterator[str]:
         """The cells: links to their cases where there are few, otherwise a picture of pixels."""
         places, colours = painted
         across, up = self._x(self._edges[0]), self._y(self._edges[1])
@@ -168,9 +165,7 @@ class _MapPainting(Painting):
             href=data_address(places[np.ix_(rows, columns)], colours), image_rendering="pixelated",
         )  # fmt: skip
 
-    def _links(
-        self, known: Numbers, painted: tuple[NDArray[np.int64], list[str]], edges: tuple[Numbers, Numbers]
-    ) -> Iterator[str]:
+    def _links(self, known: Floats, painted: tuple[Ints, list[str]], edges: tuple[Floats, Floats]) -> Iterator[str]:
         (places, colours), (across, up) = painted, edges
         x, y, z = map_quantities(self._drawn)
         for row, column in np.argwhere(places >= 0).tolist():
@@ -192,7 +187,7 @@ class _MapPainting(Painting):
             )  # fmt: skip
             yield case_link(self._cases, case, told, cell)
 
-    def _filled(self, known: Numbers) -> Iterator[str]:
+    def _filled(self, known: Floats) -> Iterator[str]:
         """Colours between lines of equal value, and the numbers of these."""
         from contourpy import FillType, LineType, contour_generator
 
@@ -205,7 +200,7 @@ class _MapPainting(Painting):
             fill_type=FillType.OuterOffset, line_type=LineType.Separate,
         )  # fmt: skip
         for lower, upper in pairwise(levels):
-            points, offsets = cast("tuple[list[Numbers], list[NDArray[np.int64]]]", made.filled(lower, upper))
+            points, offsets = cast("tuple[list[Floats], list[Ints]]", made.filled(lower, upper))
             path = "".join(
                 path_of(*polygon[start:stop].T) + "z"
                 for polygon, starts in zip(points, offsets, strict=True)
@@ -215,7 +210,7 @@ class _MapPainting(Painting):
             yield element("path", d=path, fill=colour, fill_rule="evenodd", stroke=colour, stroke_width=0.5)
         written: list[tuple[float, float]] = []
         for level in levels:
-            lines = cast("list[Numbers]", made.lines(level))
+            lines = cast("list[Floats]", made.lines(level))
             yield element("path", d="".join(path_of(*line.T) for line in lines), fill="none", stroke="#404040",
                           stroke_width=0.8, class_="level")  # fmt: skip
             longest = max(lines, key=len, default=None)
@@ -246,7 +241,7 @@ class _MapPainting(Painting):
             yield element("path", d=path, fill=colour_of(look.colour), stroke="var(--paper)", stroke_width=0.7,
                           pointer_events="none")  # fmt: skip
 
-    def _legend(self, known: Numbers, *, below: bool) -> None:
+    def _legend(self, known: Floats, *, below: bool) -> None:
         drawn = self._drawn
         entries = [regime_entry(marks.regime) for marks in doubtful_marks(drawn)]
         for name, (colour, _) in self._orders.looks.items() if self._orders is not None else ():
@@ -261,7 +256,7 @@ class _MapPainting(Painting):
             self._text(shown(drawn.refined.sentence))
 
 
-def _has_levels(values: Numbers) -> bool:
+def _has_levels(values: Floats) -> bool:
     """Whether there are lines of equal value."""
     known = values[np.isfinite(values)]
     return min(values.shape) > 1 and known.size > 0 and bool(known.max() > known.min())

@@ -15,6 +15,7 @@ from sprag_study.service.answers.results import CurvesData, Jump, MapData, MapPo
 from sprag_study.service.json_text import numbers
 from sprag_study.service.reading.directions import in_words
 from sprag_study.service.results.refined import Line, RefinedMap, jumps_of
+from sprag_study.worker.arrays import Bools, Floats, Ints
 from sprag_study.worker.codes import PENDING
 from sprag_study.worker.models import OK, WorkerEnding
 
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from sprag_study.worker.planning.refine_plan import RefinePlan
 
 #: Results of cases, aligned with them: (case numbers, result names) -> columns.
-Fetch = Callable[[NDArray[np.int64], Sequence[str]], "CaseColumns"]
+Fetch = Callable[[Ints, Sequence[str]], "CaseColumns"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,20 +80,20 @@ class Curve:
     """
 
     line: Line
-    y: dict[str, NDArray[np.float64]]
+    y: dict[str, Floats]
     endings: list[str]
     regimes: list[str | None] | None = None
     orders: list[int | None] | None = None
     refined: Refined | None = None
     jumps: list[Jump] | None = None
     flags: list[str] | None = None
-    usable: dict[str, NDArray[np.bool_]] | None = None
+    usable: dict[str, Bools] | None = None
 
-    def known(self, name: str) -> NDArray[np.float64]:
+    def known(self, name: str) -> Floats:
         """A result of each case; NaN where there is none that counts."""
         return self.y[name] if self.usable is None else np.where(self.usable[name], self.y[name], np.nan)
 
-    def shown(self, name: str) -> NDArray[np.float64]:
+    def shown(self, name: str) -> Floats:
         """A result of each case in pictures, where motions that had not settled are marked; NaN for failed cases."""
         ok = np.array([ending == OK for ending in self.endings], dtype=np.bool_)
         return np.where(ok if self.usable is None else ok | self.usable[name], self.y[name], np.nan)
@@ -173,17 +174,17 @@ class Map:
     at: dict[str, float]
     at_units: dict[str, str]
     result: ResultInfo
-    cases: NDArray[np.int64]
-    values: NDArray[np.float64]
+    cases: Ints
+    values: Floats
     endings: list[list[str]]
     regimes: list[list[str | None]] | None = None
     orders: list[list[int | None]] | None = None
     refined: RefinedMap | None = None
     flags: list[list[str]] | None = None
     title: str = ""
-    usable: NDArray[np.bool_] | None = None
+    usable: Bools | None = None
 
-    def known(self) -> NDArray[np.float64]:
+    def known(self) -> Floats:
         """The values; NaN where there is none that counts, which pictures leave blank."""
         return self.values if self.usable is None else np.where(self.usable, self.values, np.nan)
 
@@ -251,7 +252,7 @@ class Map:
         )
 
 
-def _complete(missing: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _complete(missing: Bools) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Rows and columns that remain when the emptiest is removed repeatedly until nothing is missing."""
     rows, columns = np.ones(missing.shape[0], dtype=np.bool_), np.ones(missing.shape[1], dtype=np.bool_)
     in_rows, in_columns = missing.sum(axis=1), missing.sum(axis=0)
@@ -271,7 +272,7 @@ def flag_names(flags: Sequence[str]) -> list[list[str]]:
     return [[name for name in text.split(",") if name] for text in flags]
 
 
-def not_run(endings: Sequence[str] | Sequence[Sequence[str]]) -> NDArray[np.bool_]:
+def not_run(endings: Sequence[str] | Sequence[Sequence[str]]) -> Bools:
     """Which cases have no ending of their own, either yet or ever; shape as ``endings``."""
     own = np.array(endings, dtype=object)
     return np.asarray((own == PENDING) | (own == WorkerEnding.CANCELLED.value), dtype=np.bool_)

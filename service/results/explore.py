@@ -27,10 +27,9 @@ from sprag_study.worker.codes import FLAG_MASKS
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
-
     from sprag_study.service.reading.reader import Reading
     from sprag_study.service.storage.rows.columns import RowColumns
+    from sprag_study.worker.arrays import Bools, Floats, Ints
     from sprag_study.worker.models import ResultInfo
     from sprag_study.worker.study import Study
 
@@ -106,9 +105,9 @@ class Further:
     """
 
     infos: tuple[ResultInfo, ...]
-    cases: NDArray[np.int64]
-    values: dict[str, NDArray[np.float64]]
-    keys: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    cases: Ints
+    values: dict[str, Floats]
+    keys: dict[str, Floats] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,10 +161,10 @@ class Explored:
     plan: Plan
     rows: RowColumns
     known: int
-    selected: NDArray[np.bool_]
-    order: NDArray[np.int64]
-    keys: NDArray[np.float64]
-    values: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    selected: Bools
+    order: Ints
+    keys: Floats
+    values: dict[str, Floats] = field(default_factory=dict)
     conditions: tuple[Condition, ...] = ()
 
     @property
@@ -269,7 +268,7 @@ def explore(study: Study, plan: Plan, rows: RowColumns, further: Further | None 
     return Explored(study, plan, rows, known, selected, order, keys, shown, tuple(_alone(masks)))
 
 
-def _of_cases(rows: RowColumns, cases: NDArray[np.int64]) -> RowColumns:
+def _of_cases(rows: RowColumns, cases: Ints) -> RowColumns:
     """The rows of these cases, all of which have one."""
     at = np.searchsorted(rows.cases, cases)
     return replace(
@@ -277,12 +276,10 @@ def _of_cases(rows: RowColumns, cases: NDArray[np.int64]) -> RowColumns:
     )
 
 
-def _masks(
-    study: Study, plan: Plan, rows: RowColumns, every: Mapping[str, NDArray[np.float64]]
-) -> dict[str, NDArray[np.bool_]]:
+def _masks(study: Study, plan: Plan, rows: RowColumns, every: Mapping[str, Floats]) -> dict[str, Bools]:
     """Which cases are within each condition: bool arrays, shape (known,)."""
     query, empty = plan.query, np.empty(0)
-    found: dict[str, NDArray[np.bool_]] = {}
+    found: dict[str, Bools] = {}
     for one in plan.ranges:
         values = every.get(one.name, empty)
         within = values >= one.limit if one.at_least else values <= one.limit
@@ -304,7 +301,7 @@ def _masks(
     return found
 
 
-def _alone(masks: Mapping[str, NDArray[np.bool_]]) -> Iterator[Condition]:
+def _alone(masks: Mapping[str, Bools]) -> Iterator[Condition]:
     """What each condition does alone."""
     missed = sum((~mask for mask in masks.values()), np.zeros(1, dtype=np.int64))
     for name, mask in masks.items():
@@ -319,27 +316,27 @@ def _kind_keys(sort: str, kinds: Sequence[tuple[str, str]]) -> list[float]:
     return [ranks[ending] for ending, _ in kinds]
 
 
-def _upwards(keys: NDArray[np.float64], *, descending: bool) -> NDArray[np.float64]:
+def _upwards(keys: Floats, *, descending: bool) -> Floats:
     """Keys by which rows are sorted upwards, NaN last."""
     return np.where(np.isnan(keys), np.inf, -keys if descending else keys)
 
 
 def _beyond(
-    places: NDArray[np.int64],
-    keys: NDArray[np.float64],
-    cases: NDArray[np.int64],
+    places: Ints,
+    keys: Floats,
+    cases: Ints,
     after: After,
     *,
     descending: bool,
-) -> NDArray[np.int64]:
+) -> Ints:
     """Those of ``places`` that come after a case in their order."""
     own = _upwards(keys[places], descending=descending)
     last = _upwards(np.array([after.value]), descending=descending)[0]
-    beyond: NDArray[np.int64] = places[(own > last) | ((own == last) & (cases[places] > after.case))]
+    beyond: Ints = places[(own > last) | ((own == last) & (cases[places] > after.case))]
     return beyond
 
 
-def _first(places: NDArray[np.int64], keys: NDArray[np.float64], count: int, *, descending: bool) -> NDArray[np.int64]:
+def _first(places: Ints, keys: Floats, count: int, *, descending: bool) -> Ints:
     """The first ``count`` of ``places`` in the order of their keys; NaN last, equal keys in their own order."""
     own = _upwards(keys[places] if places.size else keys[:0], descending=descending)
     if count < places.size:
@@ -348,7 +345,7 @@ def _first(places: NDArray[np.int64], keys: NDArray[np.float64], count: int, *, 
         near = np.concatenate([below, np.flatnonzero(own == limit)[: count - below.size]])
     else:
         near = np.arange(places.size)
-    chosen: NDArray[np.int64] = places[near[np.lexsort((near, own[near]))]]
+    chosen: Ints = places[near[np.lexsort((near, own[near]))]]
     return chosen
 
 
@@ -384,7 +381,7 @@ def _range(study: Study, infos: Sequence[ResultInfo], units: Mapping[str, str], 
     return Range(name, sign in (">=", "≥"), value_of(name, value, units[name], "where"))
 
 
-def histogram(values: NDArray[np.float64], selected: NDArray[np.bool_], bins: int = BINS) -> Histogram | None:
+def histogram(values: Floats, selected: Bools, bins: int = BINS) -> Histogram | None:
     """Numbers of cases in equal intervals of their range; None where no case has a number."""
     known = np.isfinite(values)
     if not known.any():

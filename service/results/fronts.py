@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from sprag_study.service.reading.quantities import Units
     from sprag_study.service.results.curves import Fetch
     from sprag_study.service.storage.studies.records import RoundRecord
+    from sprag_study.worker.arrays import Bools, Floats, Ints
     from sprag_study.worker.models import ResultInfo
     from sprag_study.worker.planning.goals import Front, Limit
     from sprag_study.worker.study import Study
@@ -74,13 +75,13 @@ class Designs:
     study: Study
     plan: GoalPlan
     infos: dict[str, ResultInfo]
-    numbers: NDArray[np.int64]
+    numbers: Ints
     front: Front
-    exact: NDArray[np.bool_]
-    values: dict[str, NDArray[np.float64]]
-    order: NDArray[np.int64]
+    exact: Bools
+    values: dict[str, Floats]
+    order: Ints
     rounds: list[RoundRecord]
-    round: NDArray[np.int64]
+    round: Ints
     pending: int
     regimes: list[list[str | None]] | None
     flags: list[list[str]]
@@ -166,13 +167,13 @@ def designs_of(study: Study, rounds: list[RoundRecord], fetch: Fetch, *, exact: 
     )
 
 
-def _regimes(regime: ResultInfo, codes: NDArray[np.float64]) -> list[list[str | None]]:
+def _regimes(regime: ResultInfo, codes: Floats) -> list[list[str | None]]:
     """Names of regimes, None for a case without, from their codes."""
     cells = [[regime.cell(code) for code in own] for own in codes.tolist()]
     return [[None if cell is None else str(cell) for cell in own] for own in cells]
 
 
-def _for_derivatives(rounds: Sequence[RoundRecord], designs: int, each: int) -> NDArray[np.bool_]:
+def _for_derivatives(rounds: Sequence[RoundRecord], designs: int, each: int) -> Bools:
     """Which designs the polish ran for its derivatives only: those of its first round."""
     first = next((one.cases for one in rounds if one.summary.get("phase") == "polish"), range(0))
     marked = np.zeros(designs, dtype=np.bool_)
@@ -267,7 +268,7 @@ def design_json(found: Designs, position: int) -> Design:
     }
 
 
-def worst_of(limit: Limit, values: NDArray[np.float64]) -> NDArray[np.float64]:
+def worst_of(limit: Limit, values: Floats) -> Floats:
     """What is farthest on the wrong side of a limit among the operating points of each design; shape (designs,).
 
     ``values`` have the shape (designs, operating points); a missing one is the worst.
@@ -275,7 +276,7 @@ def worst_of(limit: Limit, values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(values[np.arange(len(values)), worst_places(limit, values)])
 
 
-def worst_places(limit: Limit, values: NDArray[np.float64]) -> NDArray[np.intp]:
+def worst_places(limit: Limit, values: Floats) -> NDArray[np.intp]:
     """The operating points of `worst_of`, shape (designs,)."""
     signs = {"at_least": -1.0, "at_most": 1.0}
     off = signs[limit.kind] * values if limit.kind in signs else np.abs(values - limit.value)

@@ -14,17 +14,14 @@ import numpy as np
 from sprag_study.worker.models import NO_PARAMETERS
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from sprag_study.worker.arrays import Ints
     from sprag_study.worker.study import Study
-
-    Cases = NDArray[np.int64]
 
 #: Curves that can be distinguished by colour. Of more machines, some are chosen, or asked for.
 MOST_CURVES: Final = 8
 
 
-def open_axes(study: Study, cases: Cases, named: Collection[int]) -> list[int]:
+def open_axes(study: Study, cases: Ints, named: Collection[int]) -> list[int]:
     """Positions of the axes without a role (``named``) in which the cases differ, drives and directions excepted."""
     found = []
     for position, axis in enumerate(study.axes):
@@ -35,7 +32,7 @@ def open_axes(study: Study, cases: Cases, named: Collection[int]) -> list[int]:
     return found
 
 
-def cases_with(study: Study, values: Mapping[int, Sequence[float]]) -> Cases:
+def cases_with(study: Study, values: Mapping[int, Sequence[float]]) -> Ints:
     """The cases that have one of these values (SI, of the axis) on each of these axes, ascending."""
     chosen = np.ones(study.cases, dtype=np.bool_)
     for position, wanted in values.items():
@@ -45,7 +42,7 @@ def cases_with(study: Study, values: Mapping[int, Sequence[float]]) -> Cases:
     return np.flatnonzero(chosen).astype(np.int64)
 
 
-def machines(study: Study, axes: Iterable[int], cases: Cases) -> Cases:
+def machines(study: Study, axes: Iterable[int], cases: Ints) -> Ints:
     """Numbers from 0 that are equal where cases are equal on all of ``axes``, ascending with their values."""
     member = np.zeros(cases.size, dtype=np.int64)
     count = 1
@@ -59,7 +56,7 @@ def machines(study: Study, axes: Iterable[int], cases: Cases) -> Cases:
     return member.astype(np.int64)
 
 
-def left_open(study: Study, x: int, by: Collection[int], cases: Cases) -> tuple[list[int], bool]:
+def left_open(study: Study, x: int, by: Collection[int], cases: Ints) -> tuple[list[int], bool]:
     """The axes without a role in which the cases differ, and whether a curve for each combination is few of them.
 
     ``x`` is the axis along the curves, and ``by`` those that distinguish curves already. Few are at most `MOST_CURVES`,
@@ -70,14 +67,14 @@ def left_open(study: Study, x: int, by: Collection[int], cases: Cases) -> tuple[
     return left, after <= max(before, MOST_CURVES)
 
 
-def longest(study: Study, x: int, cases: Cases) -> tuple[int, int]:
+def longest(study: Study, x: int, cases: Ints) -> tuple[int, int]:
     """Of curves along axis ``x``: the largest number of cases on one, and the number of curves."""
     member = machines(study, open_axes(study, cases, {x}), cases)
     counts = np.bincount(member) if member.size else np.zeros(1, dtype=np.int64)
     return int(counts.max()), int(counts.size)
 
 
-def usual_machine(study: Study, axes: Sequence[int], cases: Cases) -> dict[int, float]:
+def usual_machine(study: Study, axes: Sequence[int], cases: Ints) -> dict[int, float]:
     """Values (SI) of several axes that occur together: the base's where they do, otherwise those of most cases."""
     if not axes:
         return {}

@@ -19,10 +19,9 @@ from sprag_study.worker.planning.refine_plan import REFINE, RefinePlan
 from sprag_study.worker.planning.rounds import Rows
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from sprag_study.service.answers.results import Jump
     from sprag_study.service.storage.studies.records import CaseColumns
+    from sprag_study.worker.arrays import Bools, Floats, Ints
     from sprag_study.worker.study import Study
 
 
@@ -33,7 +32,7 @@ class Line:
     by: dict[str, float]
     at: dict[str, float]
     x: tuple[float, ...]
-    cases: NDArray[np.int64]
+    cases: Ints
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,10 +56,10 @@ class RefinedMap:
     error: float | None
     jumps_share: float
     passed: bool
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
-    values: NDArray[np.float64]
-    cases: NDArray[np.int64]
+    x: Floats
+    y: Floats
+    values: Floats
+    cases: Ints
 
     @property
     def failed(self) -> bool:
@@ -100,7 +99,7 @@ def families(plan: RefinePlan) -> list[str]:
 
 
 def refined_curves(
-    model: str, plan: RefinePlan, lines: Sequence[Line], run: NDArray[np.bool_], columns: CaseColumns
+    model: str, plan: RefinePlan, lines: Sequence[Line], run: Bools, columns: CaseColumns
 ) -> list[Refined]:
     """What the planner says of each line, which is one combination of the fixed axes.
 
@@ -117,14 +116,14 @@ def refined_curves(
     return [every[int(plan.places(own[:1])[0][0])] for own in points]
 
 
-def _points(plan: RefinePlan, line: Line) -> NDArray[np.float64]:
+def _points(plan: RefinePlan, line: Line) -> Floats:
     """The points of a line as the plan has them, shape (cases, columns)."""
     given = {**line.by, **line.at}
     fixed = [next((given[path] for path in axis.paths if path in given), axis.values[0]) for axis in plan.fixed]
     return np.column_stack([np.tile(fixed, (len(line.x), 1)), line.x])
 
 
-def stretches(refined: Refined, name: str, regimes: Sequence[NDArray[np.int64]]) -> tuple[NDArray[np.int64], ...]:
+def stretches(refined: Refined, name: str, regimes: Sequence[Ints]) -> tuple[Ints, ...]:
     """Indices of the points of a curve that straight lines join, each ascending.
 
     For a result that was not asked for: the stretches ``regimes`` of like motion, broken at every jump.
@@ -141,7 +140,7 @@ def stretches(refined: Refined, name: str, regimes: Sequence[NDArray[np.int64]])
     return tuple(found)
 
 
-def _split(joined: NDArray[np.bool_]) -> tuple[NDArray[np.int64], ...]:
+def _split(joined: Bools) -> tuple[Ints, ...]:
     return tuple(np.split(np.arange(joined.size + 1, dtype=np.int64), np.flatnonzero(~joined) + 1))
 
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sprag_study.sentences import Amount
 from sprag_study.service.reading.reader import Phrase, joined, plural, term
+from sprag_study.worker.arrays import Bools, Floats, Ints
 from sprag_study.worker.models import REGIME_SENTENCES
 
 if TYPE_CHECKING:
@@ -99,9 +99,7 @@ MARKED: Final = tuple(name for name in MARKS if name != "periodic")
 DOUBTFUL: Final = ("irregular", UNSETTLED)
 
 
-def stretches(
-    regimes: Sequence[str | None] | None, points: int, usable: NDArray[np.bool_] | None = None
-) -> list[NDArray[np.int64]]:
+def stretches(regimes: Sequence[str | None] | None, points: int, usable: Bools | None = None) -> list[Ints]:
     """Indices of the points that a line joins: neighbours of one regime, or coasting and periodic.
 
     A point without a regime (it has no result) belongs to no stretch, unless the study has no regimes at all. A point
@@ -129,7 +127,7 @@ def kind_columns(regime: ResultInfo | None) -> list[str]:
 
 
 def kinds_of(
-    columns: Mapping[str, NDArray[np.float64]], regime: ResultInfo | None
+    columns: Mapping[str, Floats], regime: ResultInfo | None
 ) -> tuple[list[str | None] | None, list[int | None] | None]:
     """Name of the regime and order of the orbit of each case; None for cases without, and where there are no regimes.
 

@@ -49,12 +49,9 @@ from sprag_study.service.spec.draws.unit import LEVELS, cases_of
 from sprag_study.worker import models
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from sprag_study.worker.arrays import Bools, Floats
     from sprag_study.worker.models import ResultInfo
     from sprag_study.worker.study import Axis, Study
-
-    Numbers = NDArray[np.float64]
 
 #: Method of the indices: exact from a full grid, from the Saltelli design, elementary effects of trajectories, from a
 #: sample, or none.
@@ -78,8 +75,8 @@ class Effect:
 
     paths: tuple[str, ...]
     unit: str
-    values: Numbers
-    means: Numbers
+    values: Floats
+    means: Floats
     indices: Indices
 
     def to_json(self) -> AxisEffect:
@@ -181,7 +178,7 @@ def _design(study: Study, spec: Mapping[str, Any]) -> Mapping[str, Any] | None:
     return sample if cases == study.cases else None
 
 
-def _settled_only(y: Numbers, usable: NDArray[np.bool_], regimes: list[str | None] | None, notes: list[str]) -> Numbers:
+def _settled_only(y: Floats, usable: Bools, regimes: list[str | None] | None, notes: list[str]) -> Floats:
     """The result without unsettled cases; remarks about regimes are added to ``notes``."""
     unsettled = ~usable & np.isfinite(y)
     if unsettled.any():
@@ -206,8 +203,8 @@ def _of_result(
     study: Study,
     varying: list[Axis],
     info: ResultInfo,
-    y: Numbers,
-    usable: NDArray[np.bool_],
+    y: Floats,
+    usable: Bools,
     regimes: list[str | None] | None,
     sample: Mapping[str, Any] | None,
 ) -> Sensitivity:
@@ -252,8 +249,8 @@ def _of_result(
 def _shares(
     study: Study,
     varying: list[Axis],
-    y: Numbers,
-    columns: Numbers,
+    y: Floats,
+    columns: Floats,
     sample: Mapping[str, Any] | None,
     notes: list[str],
 ) -> tuple[Method, list[Indices], list[Pair]]:
@@ -286,7 +283,7 @@ def _shares(
     return method, indices, pairs
 
 
-def _main_effect(axis: Axis, column: Numbers, y: Numbers, *, drawn: bool) -> tuple[Numbers, Numbers]:
+def _main_effect(axis: Axis, column: Floats, y: Floats, *, drawn: bool) -> tuple[Floats, Floats]:
     """Mean of the result at each value of the axis, or over groups of about equally many values where it has many.
 
     Values that were ``drawn`` are always grouped. The cases of one value stay together: a group with only some of them
@@ -306,7 +303,7 @@ def _main_effect(axis: Axis, column: Numbers, y: Numbers, *, drawn: bool) -> tup
         return values, np.asarray(np.where(count > 0, total / np.maximum(count, 1), np.nan), dtype=np.float64)
 
 
-def _too_few(x: Numbers) -> str:
+def _too_few(x: Floats) -> str:
     """The sentence about too few cases of a sample, shape (cases, axes); "" where they suffice or are not a sample."""
     few = len(x) < LEAST_CASES and going_together(x) is None and all(scattered(column) for column in x.T)
     needed = Phrase("too few cases for indices: {count}, and {least} are needed", count=len(x), least=LEAST_CASES)

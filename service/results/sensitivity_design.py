@@ -11,9 +11,7 @@ from sprag_study.sentences import Name
 from sprag_study.service.reading.reader import Phrase
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Numbers = NDArray[np.float64]
+    from sprag_study.worker.arrays import Bools, Floats
 
 #: Least share of cases with a unique value on an axis whose values were drawn.
 _LEAST_DISTINCT: Final = 0.95
@@ -27,12 +25,12 @@ _TOGETHER: Final = 0.99
 _LEAST_GRID: Final = 0.1
 
 
-def scattered(column: Numbers) -> bool:
+def scattered(column: Floats) -> bool:
     """Whether nearly every case has a unique value in ``column``, shape (cases,)."""
     return bool(np.unique(column).size >= _LEAST_DISTINCT * column.size)
 
 
-def is_sample(columns: Numbers) -> bool:
+def is_sample(columns: Floats) -> bool:
     """Whether ``columns``, shape (cases, axes), look like points drawn at random, independently for each axis.
 
     Nearly all values of an axis must differ, and no axis may correlate with another, neither in its value nor in its
@@ -53,19 +51,19 @@ def is_sample(columns: Numbers) -> bool:
     return bool(correlations[apart].max() <= min(_MOST_CORRELATED, _CHANCE / math.sqrt(cases - 1)))
 
 
-def is_factorial(columns: Numbers) -> bool:
+def is_factorial(columns: Floats) -> bool:
     """Whether ``columns``, shape (cases, axes), contain every combination of their values exactly once."""
     found = math.prod(np.unique(column).size for column in columns.T)
     return found == len(columns) == len(np.unique(columns, axis=0))
 
 
-def factorial_table(columns: Numbers, y: Numbers) -> Numbers:
+def factorial_table(columns: Floats, y: Floats) -> Floats:
     """``y`` of the cases of `is_factorial` columns as an array with one dimension per axis, values ascending."""
     shape = tuple(np.unique(column).size for column in columns.T)
     return y[np.lexsort(columns.T[::-1])].reshape(shape)
 
 
-def going_together(columns: Numbers) -> tuple[int, int] | None:
+def going_together(columns: Floats) -> tuple[int, int] | None:
     """Two axes whose orders determine each other, such as those of a zip; None when there are none."""
     if len(columns) < 2 or columns.shape[1] < 2:
         return None
@@ -80,7 +78,7 @@ def going_together(columns: Numbers) -> tuple[int, int] | None:
     return None
 
 
-def why_no_shares(columns: Numbers, known: NDArray[np.bool_], names: list[str]) -> str:
+def why_no_shares(columns: Floats, known: Bools, names: list[str]) -> str:
     """The sentence about cases that are neither a sample nor a complete grid; ``known`` marks those with the result.
 
     ``columns`` has shape (cases, axes), over all cases; ``names`` are those of the axes.
@@ -109,7 +107,7 @@ def why_no_shares(columns: Numbers, known: NDArray[np.bool_], names: list[str]) 
     return Phrase("the cases are neither a complete grid nor a sample; main effects are means over the available cases")
 
 
-def _ranks(columns: Numbers) -> Numbers:
+def _ranks(columns: Floats) -> Floats:
     """Ranks of each column from -1 to 1, equal for equal values, shape (cases, axes)."""
     found = np.empty(columns.shape)
     for at, column in enumerate(columns.T):

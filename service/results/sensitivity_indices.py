@@ -15,9 +15,7 @@ import numpy as np
 from sprag_study.service.reading.reader import Phrase
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Numbers = NDArray[np.float64]
+    from sprag_study.worker.arrays import Bools, Floats
 
 #: Fewest cases from which indices are estimated.
 LEAST_CASES: Final = 65
@@ -62,7 +60,7 @@ def nothing(axes: int) -> Found:
     return [Indices()] * axes, []
 
 
-def grid_indices(table: Numbers, positions: list[int]) -> Found:
+def grid_indices(table: Floats, positions: list[int]) -> Found:
     """Exact shares of the variance over the points of a full grid, all with equal weight."""
     variance = float(table.var())
     if not variance > 0.0:
@@ -82,7 +80,7 @@ def grid_indices(table: Numbers, positions: list[int]) -> Found:
     return found, pairs
 
 
-def saltelli_indices(y: Numbers, base: int, dimensions: int, notes: list[str], *, second_order: bool) -> Found:
+def saltelli_indices(y: Floats, base: int, dimensions: int, notes: list[str], *, second_order: bool) -> Found:
     """SALib's estimates; a point with any missing case is left out with all its cases."""
     from SALib.analyze import sobol
 
@@ -105,7 +103,7 @@ def saltelli_indices(y: Numbers, base: int, dimensions: int, notes: list[str], *
     return indices, pairs
 
 
-def morris_indices(x: Numbers, y: Numbers, levels: int, notes: list[str]) -> Found:
+def morris_indices(x: Floats, y: Floats, levels: int, notes: list[str]) -> Found:
     """SALib's elementary effects; a trajectory with any missing case is left out. ``x`` has the shape (cases, axes)."""
     from SALib.analyze import morris
 
@@ -130,7 +128,7 @@ def morris_indices(x: Numbers, y: Numbers, levels: int, notes: list[str]) -> Fou
     return [Indices(**{name: _finite(found[key][i]) for name, key in names.items()}) for i in range(dimensions)], []
 
 
-def sample_indices(x: Numbers, y: Numbers, notes: list[str]) -> Found:
+def sample_indices(x: Floats, y: Floats, notes: list[str]) -> Found:
     """First-order indices from a sample (`is_sample`), by SALib's random balance design."""
     from SALib.analyze import rbd_fast
 
@@ -140,7 +138,7 @@ def sample_indices(x: Numbers, y: Numbers, notes: list[str]) -> Found:
     return [Indices(_finite(found["S1"][i]), _finite(found["S1_conf"][i])) for i in range(x.shape[1])], []
 
 
-def _whole(blocks: Numbers, notes: list[str], *, trajectories: bool = False) -> NDArray[np.bool_]:
+def _whole(blocks: Floats, notes: list[str], *, trajectories: bool = False) -> Bools:
     """Which rows of ``blocks`` have no missing number; others are noted."""
     whole = np.isfinite(blocks).all(axis=1)
     if not whole.all():

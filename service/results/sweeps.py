@@ -14,11 +14,10 @@ from sprag_study.worker.directions import DOWN, SWEEP, direction
 from sprag_study.worker.models import JUMPED
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from sprag_study.service.answers.results import Jump
     from sprag_study.service.results.curves import Curve, Curves
     from sprag_study.service.results.refined import Line
+    from sprag_study.worker.arrays import Bools, Floats, Ints
     from sprag_study.worker.study import Study
 
 #: Difference of up and down, relative to the range of both, from which on it is reported.
@@ -70,12 +69,10 @@ def jumps_of_line(
     return found
 
 
-def broken_at(
-    stretches: Sequence[NDArray[np.int64]], x: NDArray[np.float64], jumps: Sequence[Jump]
-) -> tuple[NDArray[np.int64], ...]:
+def broken_at(stretches: Sequence[Ints], x: Floats, jumps: Sequence[Jump]) -> tuple[Ints, ...]:
     """The stretches of points that a line joins, broken at jumps; ``x`` has the value of each point."""
     lows = [jump["low"] for jump in jumps]
-    found: list[NDArray[np.int64]] = []
+    found: list[Ints] = []
     for part in stretches:
         found += np.split(part, np.flatnonzero(np.isin(x[part[:-1]], lows)) + 1)
     return tuple(found)
@@ -143,7 +140,7 @@ def _interval(low: float, high: float, unit: str) -> Phrase:
     return Phrase("{low} to {high}", low=Amount(low, unit, bare=True), high=Amount(high, unit))
 
 
-def _intervals(x: NDArray[np.float64], off: NDArray[np.bool_]) -> list[tuple[float, float]]:
+def _intervals(x: Floats, off: Bools) -> list[tuple[float, float]]:
     """The first and the last x of each run of points that are marked."""
     places = np.flatnonzero(off)
     runs = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1) if places.size else []

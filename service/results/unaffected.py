@@ -17,13 +17,10 @@ from sprag_study.service.results.tolerances.nominal import nominal_only
 from sprag_study.worker import models
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from sprag_study.service.storage.store import Store
     from sprag_study.service.storage.studies.records import StudyRecord
+    from sprag_study.worker.arrays import Ints
     from sprag_study.worker.study import Study
-
-    Cases = NDArray[np.int64]
 
 #: Most cases that are compared for one axis.
 MOST_CASES: Final = 5_000
@@ -61,7 +58,7 @@ def unaffected(study: Study, fetch: Fetch) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _groups(study: Study, position: int) -> Iterator[list[Cases]]:
+def _groups(study: Study, position: int) -> Iterator[list[Ints]]:
     """Cases that differ in one axis only, group by group: few at first, then more, to the limit."""
     lines = _grid_lines(study, position) if study.combine == "grid" else _table_groups(study, position)
     at, looked = 0, 0
@@ -73,7 +70,7 @@ def _groups(study: Study, position: int) -> Iterator[list[Cases]]:
         at, size = at + size, size * 8
 
 
-def _grid_lines(study: Study, position: int) -> list[Cases]:
+def _grid_lines(study: Study, position: int) -> list[Ints]:
     """Lines along the axis, spread evenly over the grid."""
     length = len(study.axes[position])
     if length < 2:
@@ -86,7 +83,7 @@ def _grid_lines(study: Study, position: int) -> list[Cases]:
     return [start + steps * stride for start in starts]
 
 
-def _table_groups(study: Study, position: int) -> list[Cases]:
+def _table_groups(study: Study, position: int) -> list[Ints]:
     """Cases of a table that are equal in everything but one axis."""
     if study.cases > MOST_ROWS or len(study.axes) < 2:
         return []
@@ -97,7 +94,7 @@ def _table_groups(study: Study, position: int) -> list[Cases]:
     return [part.astype(np.int64) for part in parts if part.size > 1][:MOST_CASES]
 
 
-def _changes(groups: Sequence[Cases], names: Sequence[str], fetch: Fetch) -> bool:
+def _changes(groups: Sequence[Ints], names: Sequence[str], fetch: Fetch) -> bool:
     """Whether any result or ending differs within any group; an unfinished case counts as different."""
     columns = fetch(np.concatenate(groups), names)
     table = np.stack([columns.values[name] for name in names], axis=1)

@@ -22,11 +22,8 @@ from sprag_study.worker.codes import PENDING
 from sprag_study.worker.spread import DRIVE
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from sprag_study.worker.arrays import Bools, Floats, Ints
     from sprag_study.worker.study import Study
-
-    Numbers = NDArray[np.float64]
 
 #: Cases whose rows are in memory at one time, unless a single place has more.
 BLOCK_CASES: Final = 50_000
@@ -77,9 +74,9 @@ class Rows:
     """
 
     at: slice
-    cases: NDArray[np.int64]
-    values: dict[str, Numbers]
-    done: NDArray[np.bool_]
+    cases: Ints
+    values: dict[str, Floats]
+    done: Bools
 
 
 def places_of(study: Study, asked: Asked) -> Places:
@@ -165,7 +162,7 @@ def read(places: Places, line: Line, names: Sequence[str], fetch: Fetch) -> Iter
         yield Rows(part, cases, {name: values[name] for name in names}, ~not_run(endings.tolist()))
 
 
-def drive_cases(study: Study, nominal: NDArray[np.int64]) -> NDArray[np.int64]:
+def drive_cases(study: Study, nominal: Ints) -> Ints:
     """The cases of every drive at the places of these nominal cases, shape (places, drives + 1); -1 for none."""
     numbers = study.axes[-1].array.astype(np.int64)
     drives = study.drives + 1

@@ -14,11 +14,8 @@ from sprag_study.service.reading.reader import Phrase, joined
 from sprag_study.service.results.tolerances.shares import LEAST_DRIVES, Share, shares
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from sprag_study.worker.arrays import Floats
     from sprag_study.worker.study import Study
-
-    Numbers = NDArray[np.float64]
 
 #: Places of a line over which the shares are taken, evenly divided, and drives of it.
 _MOST_PLACES: Final = 33
@@ -58,7 +55,7 @@ class Matrix:
         self._column[wanted] = np.arange(wanted.size)
         self.values = np.full((min(drives, _MOST_DRIVES), wanted.size), np.nan)
 
-    def take(self, at: slice, values: Numbers) -> None:
+    def take(self, at: slice, values: Floats) -> None:
         """The results at some neighbouring places, shape (places, drives)."""
         columns = self._column[at]
         kept = columns >= 0
@@ -70,7 +67,7 @@ def causes_of(study: Study, matrix: Matrix) -> Causes:
     return variance_causes(study, matrix.values)
 
 
-def variance_causes(study: Study, values: Numbers) -> Causes:
+def variance_causes(study: Study, values: Floats) -> Causes:
     """The same of ``values``, shape (drives, columns), of the first drives of the study; NaN for missing ones."""
     spread = study.spread
     if spread is None:

@@ -22,12 +22,9 @@ from sprag_study.worker import models
 from sprag_study.worker.models.usable import against
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from sprag_study.worker.arrays import Floats
     from sprag_study.worker.models import ResultInfo
     from sprag_study.worker.study import Study
-
-    Numbers = NDArray[np.float64]
 
 #: What a condition may look like.
 EXAMPLES: Final = N_("for instance shaft.speed.mean >= 7 rad/s, torque.max <= 110 % of nominal or regime = periodic")
@@ -66,7 +63,7 @@ class Condition:
     of_nominal: bool
     text: Phrase
 
-    def margins(self, values: Numbers, nominal: Numbers, widths: Numbers | None = None) -> Numbers:
+    def margins(self, values: Floats, nominal: Floats, widths: Floats | None = None) -> Floats:
         """How far results are within the limit, relative to it: negative outside, -inf without a result.
 
         ``values`` has the shape (places, drives), ``nominal`` (places,). Equalities have 0 and -1. ``widths`` are half

@@ -17,7 +17,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    Numbers = NDArray[np.float64]
+    from sprag_study.worker.arrays import Floats, Ints
 
 #: Least probability with which an interval contains the true value.
 CONFIDENCE: Final = 0.95
@@ -36,13 +36,13 @@ class Quantiles:
         Drives with the result, over which the quantiles are taken.
     """
 
-    values: Numbers
-    low: Numbers
-    high: Numbers
-    drives: NDArray[np.int64]
+    values: Floats
+    low: Floats
+    high: Floats
+    drives: Ints
 
 
-def quantiles(results: Numbers, probabilities: tuple[float, ...]) -> Quantiles:
+def quantiles(results: Floats, probabilities: tuple[float, ...]) -> Quantiles:
     """Quantiles of ``results``, shape (places, drives), over the drives that have the result (are not NaN).
 
     The estimate is median-unbiased (Hyndman and Fan, The American Statistician 50 (1996) 361, definition 8).
@@ -93,11 +93,11 @@ class Proportion:
     reached, drives : how many drives are counted, of how many
     """
 
-    reached: NDArray[np.int64]
-    drives: NDArray[np.int64]
-    value: Numbers
-    low: Numbers
-    high: Numbers
+    reached: Ints
+    drives: Ints
+    value: Floats
+    low: Floats
+    high: Floats
 
 
 def proportion(reached: NDArray[np.integer], drives: NDArray[np.integer]) -> Proportion:

@@ -23,12 +23,9 @@ from sprag_study.worker.limits import MAX_CURVE_VALUES
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from sprag_study.worker.arrays import Floats, Ints
     from sprag_study.worker.models import ResultInfo
     from sprag_study.worker.study import Study
-
-    Numbers = NDArray[np.float64]
 
 #: Quantiles that are shown unless others are asked for.
 QUANTILES: Final = (0.05, 0.5, 0.95)
@@ -60,9 +57,9 @@ class Spread:
     lowest, highest : the drives at the ends, of those that have the result at every place
     """
 
-    nominal: Numbers
+    nominal: Floats
     quantiles: Quantiles
-    distribution: Numbers | None
+    distribution: Floats | None
     causes: Causes
     lowest: tuple[Extreme, ...]
     highest: tuple[Extreme, ...]
@@ -76,8 +73,8 @@ class RibbonLine:
     """
 
     line: Line
-    failed: NDArray[np.int64]
-    pending: NDArray[np.int64]
+    failed: Ints
+    pending: Ints
     spreads: dict[str, Spread]
 
 
@@ -133,13 +130,13 @@ class _Result:
         count, drives = line.cases.size, places.study.drives
         self._nominal = np.full(count, np.nan)
         self._parts: list[Quantiles] = []
-        self._distribution: Numbers | None = None
+        self._distribution: Floats | None = None
         self._sums = np.zeros(drives)
         self._middle = count // 2
         self._cases = np.zeros(drives, dtype=np.int64)
         self._matrix = Matrix(count, drives)
 
-    def take(self, rows: Rows, values: Numbers) -> None:
+    def take(self, rows: Rows, values: Floats) -> None:
         """Some places with all drives."""
         self._nominal[rows.at] = values[:, 0]
         self._parts.append(quantiles(values[:, 1:], self._probabilities))

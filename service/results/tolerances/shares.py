@@ -17,9 +17,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Numbers = NDArray[np.float64]
+    from sprag_study.worker.arrays import Floats
 
 #: Fewest drives from which shares are estimated.
 LEAST_DRIVES: Final = 64
@@ -39,7 +37,7 @@ class Share:
     error: float
 
 
-def shares(draws: Numbers, y: Numbers) -> list[Share] | None:
+def shares(draws: Floats, y: Floats) -> list[Share] | None:
     """The share of each tolerance.
 
     Parameters
@@ -63,7 +61,7 @@ def shares(draws: Numbers, y: Numbers) -> list[Share] | None:
     return [_share(column, centred, variance) for column in draws.T]
 
 
-def _share(x: Numbers, y: Numbers, variance: float) -> Share:
+def _share(x: Floats, y: Floats, variance: float) -> Share:
     basis = _basis(x)
     count, functions = basis.shape
     if not functions:
@@ -78,7 +76,7 @@ def _share(x: Numbers, y: Numbers, variance: float) -> Share:
     return Share(value, 1.96 * math.hypot(float(influence.std()) / math.sqrt(count), noise))
 
 
-def _basis(x: Numbers) -> Numbers:
+def _basis(x: Floats) -> Floats:
     """Functions of x with mean 0 over the drives, shape (drives, functions)."""
     different, group = np.unique(x, return_inverse=True)
     count = len(x)

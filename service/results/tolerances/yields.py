@@ -18,11 +18,8 @@ from sprag_study.service.results.tolerances.quantiles import Proportion, proport
 from sprag_study.worker import models
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from sprag_study.worker.arrays import Bools, Floats, Ints
     from sprag_study.worker.study import Study
-
-    Numbers = NDArray[np.float64]
 
 
 #: The share of good drives for which it is told how near to nominal they have to be, and the fewest that tell it: so
@@ -67,11 +64,11 @@ class YieldLine:
     line: Line
     each: Proportion
     whole: Proportion
-    nominal: NDArray[np.bool_]
-    failed: NDArray[np.int64]
-    pending: NDArray[np.int64]
+    nominal: Bools
+    failed: Ints
+    pending: Ints
     nearest: Proportion
-    within: Numbers
+    within: Floats
     causes: Causes
     worst: tuple[WorstDrive, ...]
 
@@ -132,7 +129,7 @@ def _line(places: Places, line: Line, conditions: tuple[Condition, ...], worst: 
     )
 
 
-def _near(study: Study, good: NDArray[np.bool_], run: NDArray[np.bool_]) -> tuple[Proportion, Numbers]:
+def _near(study: Study, good: Bools, run: Bools) -> tuple[Proportion, Floats]:
     """What drives gain that are near to nominal, in each tolerance.
 
     The share of good drives among the half of the ``run`` ones that is nearest to nominal, and the largest distance
@@ -159,7 +156,7 @@ class _Whole:
         self._case = np.full(drives, -1, dtype=np.int64)
         self._values = {name: np.full(drives, np.nan) for name in names}
 
-    def take(self, rows: Rows, margins: Numbers, done: NDArray[np.bool_]) -> None:
+    def take(self, rows: Rows, margins: Floats, done: Bools) -> None:
         """Some places: margins and what is run, shape (places, drives)."""
         self.done &= done.all(axis=0)
         margins = np.where(done, margins, np.inf)

@@ -16,8 +16,7 @@ from sprag_study.worker import models
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from numpy.typing import NDArray
-
+    from sprag_study.worker.arrays import Floats, Ints
     from sprag_study.worker.models import ChunkResult
 
 #: Rows that are put together at once: fewer cost time each, more memory.
@@ -51,11 +50,11 @@ class Block:
         NaN and infinities are stored as NULL; counts and categories are whole numbers.
     """
 
-    studies: NDArray[np.int64]
-    cases: NDArray[np.int64]
+    studies: Ints
+    cases: Ints
     endings: Sequence[str]
     flags: Sequence[str]
-    values: NDArray[np.float64]
+    values: Floats
 
 
 @lru_cache(maxsize=64)
@@ -73,12 +72,12 @@ def further_target(model: str, variant: str) -> Target | None:
     return None if table is None else Target(table.name, own.columns, own.whole)
 
 
-def block(study: int, cases: NDArray[np.int64], result: ChunkResult) -> Block:
+def block(study: int, cases: Ints, result: ChunkResult) -> Block:
     """The rows of those cases for `target`."""
     return Block(np.full(cases.size, study, dtype=np.int64), cases, result.endings, result.flags, result.values)
 
 
-def further_block(study: int, cases: NDArray[np.int64], result: ChunkResult) -> Block | None:
+def further_block(study: int, cases: Ints, result: ChunkResult) -> Block | None:
     """Their rows for `further_target`; None where no case has any."""
     further = result.further
     if further is None or not len(further.flags):

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag_study.service.storage.database.blocks import Block, Target
+    from sprag_study.worker.arrays import Bools, Floats
 
 #: Signature, flags (none) and the length of the extension of the header (none).
 HEADER: Final = b"PGCOPY\n\xff\r\n\0" + struct.pack(">ii", 0, 0)
@@ -85,14 +86,14 @@ class _Texts:
         self.lengths = np.array([len(text) for text in kept], dtype=np.int32)[codes]
 
 
-def _whole(column: str, values: NDArray[np.float64], known: NDArray[np.bool_]) -> NDArray[np.float64]:
+def _whole(column: str, values: Floats, known: Bools) -> Floats:
     numbers = np.where(known, values, 0.0)
     if numbers.size and not (numbers.min() >= _LEAST and numbers.max() <= _MOST):
         raise OverflowError(f"{column} has a value outside {_LEAST} to {_MOST}")
     return numbers
 
 
-def _packed(laid: NDArray[Any], texts: Sequence[_Texts], finite: NDArray[np.bool_]) -> bytes:
+def _packed(laid: NDArray[Any], texts: Sequence[_Texts], finite: Bools) -> bytes:
     """The rows one after the other, without the bytes of shorter texts and of what is NULL."""
     even = all((text.lengths == text.width).all() for text in texts)
     if even and finite.all():

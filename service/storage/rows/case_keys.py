@@ -17,11 +17,8 @@ from sprag_study.worker import fingerprint
 from sprag_study.worker.case_keys import case_keys
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from sprag_study.worker.arrays import Ints
     from sprag_study.worker.study import Study
-
-    Numbers = NDArray[np.int64]
 
 #: Values of `STUDIES.c.keyed`: not looked at yet, all cases have keys, too many cases for keys.
 NOT_YET, KEYED, TOO_MANY = 0, 1, 2
@@ -50,19 +47,19 @@ _WANTED: Final = {
 }
 
 
-def keys_of(study: Study, kin: str) -> Numbers | None:
+def keys_of(study: Study, kin: str) -> Ints | None:
     """The keys of a new study of that kin; None where it has too many cases for keys."""
     return None if study.cases > MAX_KEYED and study.plan is None else case_keys(study, kin)
 
 
-def add_keys(connection: sa.Connection, number: int, keys: Numbers) -> None:
+def add_keys(connection: sa.Connection, number: int, keys: Ints) -> None:
     """Store the keys of cases of a study."""
     query = sa.text(_ADDED[connection.dialect.name])
     for first in range(0, keys.size, _WRITTEN):
         connection.execute(query, {"study": number, "keys": json.dumps(keys[first : first + _WRITTEN].tolist())})
 
 
-def newest_with(connection: sa.Connection, keys: Numbers, below: Numbers, own: int) -> Numbers:
+def newest_with(connection: sa.Connection, keys: Ints, below: Ints, own: int) -> Ints:
     """For each key the newest study under the number ``below`` it that has rows and a case of this key; 0 for none.
 
     Only studies with rows that may be reused by this process count, and not the study ``own``.
@@ -83,6 +80,6 @@ def newest_with(connection: sa.Connection, keys: Numbers, below: Numbers, own: i
     return found
 
 
-def any_below(size: int) -> Numbers:
+def any_below(size: int) -> Ints:
     """The bounds of `newest_with` that allow every study."""
     return np.full(size, MAX_INTEGER, dtype=np.int64)

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from sprag_study.worker.arrays import Floats, Ints
+
 #: Most cases listed in one statement.
 CASES_AT_ONCE: Final = 5_000
 
@@ -33,10 +35,10 @@ class RowColumns:
         By result name; NaN for null.
     """
 
-    cases: NDArray[np.int64]
+    cases: Ints
     kinds: tuple[tuple[str, str], ...]
     kind: NDArray[np.int32]
-    values: dict[str, NDArray[np.float64]]
+    values: dict[str, Floats]
 
 
 def as_number(column: sa.Column[float]) -> sa.ColumnElement[float]:
@@ -58,7 +60,7 @@ def records(
             raise sa.exc.DBAPIError(str(query), None, error) from error
 
 
-def conditions(column: sa.ColumnElement[Any], cases: NDArray[np.int64]) -> Iterator[sa.ColumnElement[bool]]:
+def conditions(column: sa.ColumnElement[Any], cases: Ints) -> Iterator[sa.ColumnElement[bool]]:
     """Conditions that together select exactly ``cases`` (ascending, each once)."""
     if not cases.size:
         return

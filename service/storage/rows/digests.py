@@ -30,11 +30,10 @@ from sprag_study.worker.states import ChunkState, StudyEvent, StudyState
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from numpy.typing import NDArray
-
     from sprag_study.service.storage.database.session import Session
     from sprag_study.service.storage.rows.hashes import Words
     from sprag_study.service.storage.rows.order import Orders
+    from sprag_study.worker.arrays import Ints
     from sprag_study.worker.ports import Clock
 
 _LOG = logging.getLogger("sprag.digests")
@@ -121,7 +120,7 @@ class Digests(Part):
         digest = connection.execute(query).scalar_one_or_none()
         return digest is not None and not self.has_digest(connection, chunk, digest)
 
-    def require_undamaged(self, study_id: str, cases: NDArray[np.int64] | None = None, *, anew: bool = False) -> None:
+    def require_undamaged(self, study_id: str, cases: Ints | None = None, *, anew: bool = False) -> None:
         """Raise DatabaseError where rows of a study are not those that were stored; they are run again.
 
         Where all rows are looked at, its numbers of cases are compared with them, and counted again where they differ.
@@ -153,7 +152,7 @@ class Digests(Part):
             return kept.get(key)
 
     def damaged_chunks(
-        self, connection: sa.Connection, number: int, cases: NDArray[np.int64], most: int | None = None
+        self, connection: sa.Connection, number: int, cases: Ints, most: int | None = None
     ) -> list[Chunk]:
         """The finished chunks with any of these cases of a study whose rows changed.
 
@@ -336,7 +335,7 @@ def _tables(model: str, variant: str) -> list[tuple[sa.Table, bool]]:
 
 def _stored_words(
     connection: sa.Connection, table: sa.Table, row: Any, *which: sa.ColumnElement[bool], further: bool
-) -> Iterator[tuple[NDArray[np.int64], Words]]:
+) -> Iterator[tuple[Ints, Words]]:
     """Case numbers and hashes of the rows of a study in a table, in the order of the cases."""
     c, infos = table.c, models.result_infos(row.model, row.variant)
     types = [("case", np.int64), ("ending", object), ("flags", object)]
@@ -359,5 +358,5 @@ def _stored_words(
         last, skip = end, at_end + (skip if end == last else 0)
 
 
-def _ends(cases: NDArray[np.int64]) -> tuple[int, int]:
+def _ends(cases: Ints) -> tuple[int, int]:
     return int(cases[0]), int(cases[-1])

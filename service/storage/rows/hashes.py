@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from sprag_study.worker.arrays import Floats, Ints
+
     Words = NDArray[np.uint64]
 
 _MIX_A: Final = np.uint64(0xFF51AFD7ED558CCD)
@@ -49,7 +51,7 @@ def _text_words(endings: Sequence[str], flags: Sequence[str]) -> Words:
     return np.array([_text_word(*pair) for pair in pairs], dtype=np.uint64)
 
 
-def as_kept(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def as_kept(values: Floats) -> Floats:
     """Numbers as databases keep them, C-contiguous: infinities are missing, zeros have no sign, NaN has one pattern.
 
     Not copied where they are so already: to write another 300 kB takes longer than to hash them.
@@ -63,7 +65,7 @@ def as_kept(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return kept
 
 
-def _is_kept(values: NDArray[np.float64]) -> bool:
+def _is_kept(values: Floats) -> bool:
     bits = values.view(np.int64)
     kept = np.count_nonzero(np.isfinite(values))
     if kept < values.size:
@@ -72,10 +74,10 @@ def _is_kept(values: NDArray[np.float64]) -> bool:
 
 
 def row_words(
-    cases: NDArray[np.int64],
+    cases: Ints,
     endings: Sequence[str],
     flags: Sequence[str],
-    values: NDArray[np.float64],
+    values: Floats,
     *,
     further: bool = False,
 ) -> Words:

@@ -43,14 +43,11 @@ from sprag_study.worker.sweeps import whole_lines
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
-
     from sprag_study.service.storage.database.session import Session
     from sprag_study.service.storage.rows.digests import Digests
     from sprag_study.service.storage.rows.order import Orders
+    from sprag_study.worker.arrays import Bools, Floats, Ints
     from sprag_study.worker.ports import Chunk, Clock
-
-    Cases = NDArray[np.int64]
 
 #: Studies whose spans are kept in memory, about a kilobyte each; and how many are read and compared together.
 _KEPT_SPANS: Final = 20_000
@@ -82,9 +79,9 @@ _MIXED: Final = WarningText(
 class _Found:
     """Cases of a study, ascending, with the number of the study that has each and its case there."""
 
-    cases: Cases
-    studies: Cases
-    there: Cases
+    cases: Ints
+    studies: Ints
+    there: Ints
 
 
 class Reuse(Part):
@@ -148,9 +145,7 @@ class Reuse(Part):
                     connection.execute(sa.update(STUDIES).where(c.number == number).values(keyed=keyed))
             yield number
 
-    def _leave_damaged(
-        self, study: Study, cases: Cases, wanted: NDArray[np.bool_], studies: Cases, there: Cases
-    ) -> bool:
+    def _leave_damaged(self, study: Study, cases: Ints, wanted: Bools, studies: Ints, there: Ints) -> bool:
         """Unmark those of the ``wanted`` cases whose rows changed in the chunks of other studies, which run again.
 
         Whether any case is left.
@@ -210,7 +205,7 @@ class _Spans:
     """The `span` of every study examined, which alone rules out most studies. Only further rounds change it."""
 
     def __init__(self) -> None:
-        self._of: LRUCache[int, NDArray[np.float64]] = LRUCache(_KEPT_SPANS)
+        self._of: LRUCache[int, Floats] = LRUCache(_KEPT_SPANS)
         self._lock = Lock()
 
     def candidates(self, connection: sa.Connection, wanted: Wanted, kin: str, number: int, *, keyed: bool) -> list[int]:
@@ -236,7 +231,7 @@ class _Spans:
                 found += np.array(part)[may].tolist()
         return found
 
-    def _get(self, connection: sa.Connection, numbers: list[int]) -> dict[int, NDArray[np.float64]]:
+    def _get(self, connection: sa.Connection, numbers: list[int]) -> dict[int, Floats]:
         with self._lock:
             spans = {number: self._of[number] for number in numbers if number in self._of}
         missing, growing = [number for number in numbers if number not in spans], set[int]()
@@ -290,7 +285,7 @@ class _Search:
         self._kin = kin
         self._connection = connection
         self._taken = np.zeros(study.cases, dtype=np.bool_)
-        self._parts: list[tuple[Cases, int, Cases]] = []
+        self._parts: list[tuple[Ints, int, Ints]] = []
 
     def by_keys(self, number: int) -> None:
         """Look in the studies with a case of the same key: for each key in the newest one, then in the one before."""
@@ -343,7 +338,7 @@ class _Search:
         return _Found(cases[order], studies[order], np.concatenate([theirs for _, _, theirs in self._parts])[order])
 
 
-def _has_rows(connection: sa.Connection, source: sa.Row[Any], study: Study, cases: Cases) -> NDArray[np.bool_]:
+def _has_rows(connection: sa.Connection, source: sa.Row[Any], study: Study, cases: Ints) -> Bools:
     """Which cases of a study have rows with results that were computed under the fingerprint of this process."""
     stored = np.ones(cases.size, dtype=np.bool_)
     if not cases.size:
@@ -411,7 +406,7 @@ def _copy(connection: sa.Connection, table: sa.Table, chunk: Chunk, known: Known
     return done.rowcount
 
 
-def endings_of(connection: sa.Connection, model: str, variant: str, study: int, cases: Cases) -> Counter[str]:
+def endings_of(connection: sa.Connection, model: str, variant: str, study: int, cases: Ints) -> Counter[str]:
     """Number of the given cases (ascending) of a study by ending."""
     c = results_table(model, variant).c
     found: Counter[str] = Counter()

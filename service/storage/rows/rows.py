@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from sprag_study.service.storage.database.session import Session
     from sprag_study.service.storage.rows.digests import Digests
     from sprag_study.service.storage.rows.order import Orders
+    from sprag_study.worker.arrays import Floats, Ints
     from sprag_study.worker.ports import Clock
 
 #: Rows of one block of a stream.
@@ -172,7 +173,7 @@ class Rows(Part):
             counts += _count(connection, rows, condition)
         return counts
 
-    def cases_of_kind(self, study_id: str, regime: str | None = None, flag: str | None = None) -> NDArray[np.int64]:
+    def cases_of_kind(self, study_id: str, regime: str | None = None, flag: str | None = None) -> Ints:
         """Numbers of the cases of a regime or with a flag, ascending; raises StudyNotFoundError."""
         with self.session.read() as connection:
             rows = _rows(connection, study_id)
@@ -207,7 +208,7 @@ class Rows(Part):
         Of cases with several rows those of the row with that ``number``; a case without one has its ending and no
         results. Raises StudyNotFoundError, and KeyError for a name that is not a result of the study.
         """
-        wanted: NDArray[np.int64] = np.asarray(cases, dtype=np.int64).reshape(-1)
+        wanted: Ints = np.asarray(cases, dtype=np.int64).reshape(-1)
         self._digests.require_undamaged(study_id, wanted)
         unique, position = np.unique(wanted, return_inverse=True)
         endings, flags = np.full(unique.size, None, dtype=object), np.full(unique.size, "", dtype=object)
@@ -235,7 +236,7 @@ class Rows(Part):
         kinds: dict[tuple[str, str], int] = {}
         types = [("case", np.int64), ("ending", object), ("flags", object)]
         layout = np.dtype([*types, *((f"value{index}", np.float64) for index in range(len(names)))])
-        parts: list[tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64]]] = []
+        parts: list[tuple[Ints, NDArray[np.int32], Floats]] = []
         with self.session.read() as connection:
             rows = _rows(connection, study_id)
             c, own = rows.table.c, {info.name: rows.table.c[info.column] for info in rows.infos}
@@ -325,10 +326,10 @@ def _fill(
     rows: _Rows,
     table: sa.Table,
     columns: Sequence[str],
-    cases: NDArray[np.int64],
+    cases: Ints,
     endings: NDArray[np.object_],
     flags: NDArray[np.object_],
-    values: NDArray[np.float64],
+    values: Floats,
     *which: sa.ColumnElement[bool],
 ) -> None:
     """Write endings, flags (shape (m,)) and columns (shape (m, columns)) of ``cases`` (ascending) that a table has."""

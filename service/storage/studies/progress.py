@@ -25,12 +25,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from datetime import datetime
 
-    from numpy.typing import NDArray
-
     from sprag_study.service.storage.studies.records import RoundProgress
+    from sprag_study.worker.arrays import Floats
     from sprag_study.worker.order import Coverage
-
-    Times = NDArray[np.float64]
 
 #: Finished chunks that count as recent.
 RECENT_CHUNKS = 256
@@ -88,9 +85,9 @@ class RunningChunk:
 class _Past:
     """Chunks as arrays, ``work`` (cases) done evenly from ``begin`` to ``end``; complete after ``since``."""
 
-    begin: Times
-    end: Times
-    work: Times
+    begin: Floats
+    end: Floats
+    work: Floats
     since: float
     until: float
 
@@ -194,7 +191,7 @@ def _factors(past: _Past, chunks: int, ahead: float, unseen: float) -> tuple[flo
     return (1.0 + low) / (1.0 + around), (1.0 + high) * (1.0 + around)
 
 
-def _paces(past: _Past, stretches: int) -> Times:
+def _paces(past: _Past, stretches: int) -> Floats:
     """Seconds per case in sections of the recent past with equal numbers of ended chunks, relative to their mean."""
     if stretches < 3:
         return np.ones(1)
@@ -205,7 +202,7 @@ def _paces(past: _Past, stretches: int) -> Times:
         work = past.done(begin, end)
         if work > 0.0:
             found.append(past.busy(begin, end) / work)
-    paces: Times = np.array(found) / np.mean(found)
+    paces: Floats = np.array(found) / np.mean(found)
     return paces
 
 

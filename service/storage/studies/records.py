@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from datetime import datetime
 
     import sqlalchemy as sa
-    from numpy.typing import NDArray
 
+    from sprag_study.worker.arrays import Floats, Ints
     from sprag_study.worker.models import ResultInfo
     from sprag_study.worker.order import Coverage
 
@@ -197,10 +197,10 @@ class RowBlock:
     """
 
     infos: tuple[ResultInfo, ...]
-    cases: NDArray[np.int64]
+    cases: Ints
     endings: list[str]
     flags: list[str]
-    values: NDArray[np.float64]
+    values: Floats
 
     def __len__(self) -> int:
         return len(self.endings)
@@ -241,9 +241,9 @@ class CaseColumns:
         Names of the flags of each case joined by commas.
     """
 
-    cases: NDArray[np.int64]
+    cases: Ints
     endings: list[str | None]
-    values: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    values: dict[str, Floats] = field(default_factory=dict)
     flags: list[str] = field(default_factory=list)
 
 

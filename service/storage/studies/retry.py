@@ -21,11 +21,9 @@ from sprag_study.worker.sweeps import LineOrder
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
 
-    from numpy.typing import NDArray
-
+    from sprag_study.worker.arrays import Ints
     from sprag_study.worker.order import Order
 
-    Cases = NDArray[np.int64]
     #: Whether a chunk has the rows with that digest.
     IsSound = Callable[[Chunk, int], bool]
 
@@ -101,7 +99,7 @@ def give_back(
     row: sa.Row[Any],
     runs: Sequence[Run],
     counts: dict[str, int],
-    cases: Cases | None,
+    cases: Ints | None,
     is_sound: IsSound,
 ) -> list[Chunk]:
     """Delete the rows that are run again and cut the chunks so that exactly these cases wait.
