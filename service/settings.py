@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from ipaddress import IPv4Network, IPv6Network
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 import platformdirs
 from pydantic import Field, SecretStr, field_validator
@@ -384,3 +384,31 @@ def shown(default: Any) -> str:
     if isinstance(default, str):
         return _OPTION.sub(r"\1***", _USER.sub(r"\1***@", default))
     return f"{default:g}" if isinstance(default, float) else str(default)
+
+
+@dataclass(frozen=True, slots=True)
+class EffectiveSetting:
+    """A setting, or a variable of commands, with its value as text and where it comes from; a secret is not shown."""
+
+    name: str
+    value: str
+    origin: str
+
+
+#: Origins that are no variable and no file, and what stands for a secret.
+DEFAULT_ORIGIN: Final = "default"
+OPTION_ORIGIN: Final = "option"
+HIDDEN: Final = "(secret)"
+
+
+def effective(settings: Settings) -> Iterator[EffectiveSetting]:
+    """Every setting that applies in this process, in order of declaration."""
+    file, environment = read_file(Settings), {name.upper() for name, value in os.environ.items() if value}
+    for name, field in Settings.model_fields.items():
+        value, variable = getattr(settings, name), f"{ENV_PREFIX}{name.upper()}"
+        origin = DEFAULT_ORIGIN if value == field.default else OPTION_ORIGIN
+        if variable in environment or name in file:
+            origin = variable if variable in environment else os.environ[FILE_VARIABLE]
+        if name == "database" and not value:
+            value = str(default_database_path())
+        yield EffectiveSetting(name, HIDDEN if isinstance(value, SecretStr) else shown(value), origin)

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
-from typing import Final
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Final
 
 from sprag_study.service.cli.configured import read_settings
 from sprag_study.service.cli.console import WrongInputError, show_table, write_json
 from sprag_study.service.cli.options import DEFAULT_SERVER, JsonFlag
 from sprag_study.service.faults import Fault
 from sprag_study.service.languages import N_, _
+
+if TYPE_CHECKING:
+    from sprag_study.service.settings import EffectiveSetting
 
 #: Environment variables that are not settings of the service, each with its meaning.
 VARIABLES: Final = {
@@ -25,59 +28,32 @@ VARIABLES: Final = {
     "`LC_MESSAGES`, `LANG`) unless set",
     "SPRAG_DEBUG": "set to anything: a fault of the program shows where it lies",
 }
-_DEFAULT: Final = "default"
-_HIDDEN: Final = "(secret)"
-
-
-@dataclass(frozen=True, slots=True)
-class EffectiveSetting:
-    """A setting, or a variable of commands, with its value as text and where it comes from; a secret is not shown."""
-
-    name: str
-    value: str
-    origin: str
 
 
 def _cells(row: EffectiveSetting) -> tuple[str, ...]:
     """Name, value and origin of a setting for a table."""
-    value = _("(secret)") if row.value == _HIDDEN else row.value
-    return row.name, value, _("default") if row.origin == _DEFAULT else row.origin
+    from sprag_study.service.settings import DEFAULT_ORIGIN, HIDDEN
+
+    value = _("(secret)") if row.value == HIDDEN else row.value
+    return row.name, value, _("default") if row.origin == DEFAULT_ORIGIN else row.origin
 
 
 def settings(as_json: JsonFlag = False) -> None:
     """Show the settings that apply here, each with its origin: a variable of the environment, a file, the default."""
-    rows = [*_of_service(), *_of_commands()]
+    found = read_settings()
+    from sprag_study.service.settings import effective
+
+    rows = [*effective(found), *_of_commands()]
     if as_json:
         write_json({"settings": [asdict(row) for row in rows]})
     else:
         show_table("", ((_("setting"), False, True), (_("value"), False), (_("origin"), False)), map(_cells, rows))
 
 
-def _of_service() -> Iterator[EffectiveSetting]:
-    """Every setting of the service, in order of declaration."""
-    found = read_settings()
-    from pydantic import SecretStr
-
-    from sprag_study.service.settings import (
-        ENV_PREFIX,
-        FILE_VARIABLE,
-        Settings,
-        default_database_path,
-        read_file,
-        shown,
-    )
-
-    file, environment = read_file(Settings), {name.upper() for name, value in os.environ.items() if value}
-    for name in Settings.model_fields:
-        value, variable = getattr(found, name), f"{ENV_PREFIX}{name.upper()}"
-        origin = variable if variable in environment else os.environ[FILE_VARIABLE] if name in file else _DEFAULT
-        if name == "database" and not value:
-            value = str(default_database_path())
-        yield EffectiveSetting(name, _HIDDEN if isinstance(value, SecretStr) else shown(value), origin)
-
-
 def _of_commands() -> Iterator[EffectiveSetting]:
     """Every other variable, by its own name."""
+    from sprag_study.service.settings import DEFAULT_ORIGIN, EffectiveSetting
+
     try:
         from sprag_study.worker import models
     except ValueError as error:  # the engine refuses an unknown SPRAG_COMPILER
@@ -91,4 +67,4 @@ def _of_commands() -> Iterator[EffectiveSetting]:
     }
     for name in VARIABLES:
         value = os.environ.get(name, "")
-        yield EffectiveSetting(name, value or defaults.get(name, ""), name if value else _DEFAULT)
+        yield EffectiveSetting(name, value or defaults.get(name, ""), name if value else DEFAULT_ORIGIN)

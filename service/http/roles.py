@@ -98,6 +98,8 @@ _ADMINISTRATOR: Final = (
     "GET /me/audit",
     "GET /me/users",
     "POST /me/users",
+    "GET /me/settings",
+    "POST /me/settings",
     "GET /audit",
     "GET /users",
 )

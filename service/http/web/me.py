@@ -31,11 +31,14 @@ from sprag_study.service.http.web.form.values import Form
 from sprag_study.service.http.web.templates import page
 from sprag_study.service.http.web.way_in import access_of, within
 from sprag_study.service.jobs.maintenance import backups
+from sprag_study.service.jobs.reports.channels import DeliveryError
+from sprag_study.service.jobs.reports.trial import try_mail, try_webhook
 from sprag_study.service.jobs.workers import worker_list
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.faults import message
 from sprag_study.service.reading.quantities import KINDS, SI, TYPED, WORKSHOP, read_units
-from sprag_study.service.reading.reader import CAPTIONS, CODES, Choice
+from sprag_study.service.reading.reader import CAPTIONS, CODES, Choice, told
+from sprag_study.service.settings import effective
 from sprag_study.service.storage.people.audit import AuditPage, audit_filter
 from sprag_study.service.storage.people.scopes import MAX_USER_NAME
 from sprag_study.service.zones import is_zone, zones
@@ -57,7 +60,11 @@ RESTS: Final = {
 NAMES: Final = {CAPTIONS: N_("words"), CODES: N_("code names, as in specs and files")}
 #: Parts of the page, by their address.
 PARTS: Final = {"/me": N_("Me"), "/me/workers": N_("Workers and backups")}
-_OF_ADMINISTRATORS: Final = {"/me/users": N_("Users and tokens"), "/me/audit": N_("Audit log")}
+_OF_ADMINISTRATORS: Final = {
+    "/me/users": N_("Users and tokens"),
+    "/me/audit": N_("Audit log"),
+    "/me/settings": N_("Settings"),
+}
 _LISTED: Final = 100
 
 
@@ -181,6 +188,27 @@ def _changed(
 
 def _back(address: str) -> Response:
     return RedirectResponse(address, status_code=303)
+
+
+@router.get("/me/settings")
+def settings(context: Ctx) -> Response:
+    """Every setting with its origin, and forms that send a test mail or a test webhook."""
+    return page("settings.html", parts=_parts(), settings=list(effective(context.settings)), values={})
+
+
+@router.post("/me/settings")
+def try_reports(context: Ctx, values: Form) -> Response:
+    """Send a test mail or a test webhook, and say what came of it."""
+    send = {"mail": try_mail, "webhook": try_webhook}[choice_of("by", values.get("by", ""), ("mail", "webhook"))]
+    to, status, shown = values.get("to", "").strip(), 200, {}
+    try:
+        send(to, context.settings.reports, context.store.clock.now())
+    except DeliveryError as error:
+        status, shown = 422, {"problem": told(str(error))}
+    else:
+        shown = {"sent": to}
+    found = list(effective(context.settings))
+    return page("settings.html", status, parts=_parts(), part="/me/settings", settings=found, values=values, **shown)
 
 
 @router.get("/me/workers")

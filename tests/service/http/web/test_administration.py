@@ -1,20 +1,26 @@
-"""Users and tokens are added, changed and ended on the page Me, by those who may."""
+"""Users, tokens and reports are seen to on the page Me, by those who may."""
 
 from __future__ import annotations
 
+import base64
+import json
 import re
 from collections.abc import Callable
 from datetime import timedelta
+from html import unescape
 from typing import TYPE_CHECKING
 
 import httpx
 import pytest
+from pydantic import SecretStr
 
 from sprag_study.service.actor import Door, Role, act_as, of_machine
+from sprag_study.service.delivery import origin_of
 from sprag_study.service.storage.errors import TokenNotFoundError
 from sprag_study.service.storage.people.people import Quota
 from sprag_study.service.storage.people.scopes import TokenScope, TokenState
 from tests.service.http.people import OWN, Office
+from tests.service.schedules.receivers import mail_server, webhook
 
 if TYPE_CHECKING:
     from sprag_study.service.settings import Settings
@@ -140,3 +146,56 @@ def test_the_first_token_says_that_requests_need_one_from_now_on(service: Servic
     assert "From now on every request to this service needs a token" in answer.text
     (secret,) = SECRET.findall(answer.text)
     assert secret not in service.store.people.tokens()[0].digest
+
+
+def test_settings_have_their_origins_and_keep_secrets(
+    settings: Settings, service: Service, connect: Callable[..., httpx.Client], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SPRAG_URL_PREFIX", "/sprag")
+    secret = "smtp://ada:" + "hunter2" + "@mail.example"
+    office = Office(settings, service, connect, smtp_url=SecretStr(secret), port=8123)
+    text = office.program("ada").get("/me/settings").text
+    rows = dict(
+        re.findall(r'<td class="name" translate="no">(\w+)</td><td translate="no">.*?</td><td>(.*?)</td>', text)
+    )
+    assert rows["smtp_url"] == "option of the command"
+    assert rows["url_prefix"] == "<code>SPRAG_URL_PREFIX</code>"
+    assert "default" in rows["nightly_at"]
+    assert "hunter2" not in text
+    assert office.program("dora").get("/me/settings").status_code == 403
+
+
+def test_a_test_mail_and_a_test_webhook_are_sent(
+    settings: Settings, service: Service, connect: Callable[..., httpx.Client]
+) -> None:
+    with mail_server() as box, webhook() as hook:
+        more = {
+            "smtp_url": SecretStr(f"smtp+plain://{box.host}:{box.port}"),
+            "mail_from": "sprag@example.com",
+            "mail_domains": ("example.com",),
+            "webhook_origins": (origin_of(hook.address),),
+            "webhook_secret": SecretStr("whsec_" + base64.b64encode(b"k" * 32).decode()),
+        }
+        ada = Office(settings, service, connect, **more).program("ada")
+
+        def send(by: str, to: str) -> tuple[int, str]:
+            answer = ada.post("/me/settings", data={"by": by, "to": to}, headers=OWN)
+            said = re.search(r'<p class="(?:notice|fault)"[^>]*>(.*?)</p>', answer.text)
+            assert said is not None, answer.text
+            return answer.status_code, unescape(said[1])
+
+        assert send("mail", "dora@example.com") == (200, "Sent to dora@example.com.")
+        (mail,) = box.mails
+        assert (mail["To"], mail["Subject"]) == ("dora@example.com", "Test mail of Sprag")
+        assert send("mail", "dora@other.example")[0] == 422
+        assert send("mail", "dora@example.com\nBcc: eve@example.com") == (
+            422, "'dora@example.com\\nBcc: eve@example.com' is not a mail address.",
+        )  # fmt: skip
+        box.reply = lambda _address: "550 unknown"
+        assert "550" in send("mail", "nobody@example.com")[1]
+        assert send("webhook", f"{hook.address}/here") == (200, f"Sent to {hook.address}/here.")
+        ((path, _headers, body),) = hook.requests
+        assert (path, json.loads(body)["type"]) == ("/here", "test")
+        assert send("webhook", "https://elsewhere.example/x")[0] == 422
+        assert len(box.mails) == 1
+        assert len(hook.requests) == 1
