@@ -32,6 +32,7 @@ if TYPE_CHECKING:
         preset,
         with_units,
     )
+    from sprag_study.service.client.machines import Drive, Shaft
     from sprag_study.service.extras import MissingExtraError
     from sprag_study.service.spec.report import SpecError
     from sprag_study.worker.errors import SpragError
@@ -54,10 +55,12 @@ _OF_CLIENT: Final = (
     "preset",
     "with_units",
 )
-#: Errors that need nothing but the base installation, and their modules.
-_ERRORS: Final = {
+#: What else needs nothing but the base installation, and its modules.
+_OF_BASE: Final = {
+    "Drive": "sprag_study.service.client.machines",
     "ExecutorError": "sprag_study.worker.ports",
     "MissingExtraError": "sprag_study.service.extras",
+    "Shaft": "sprag_study.service.client.machines",
     "SpecError": "sprag_study.service.spec.report",
     "SpragError": "sprag_study.worker.errors",
     "StoreError": "sprag_study.worker.ports",
@@ -67,10 +70,12 @@ __all__ = [
     "AsyncStudy",
     "Client",
     "Curves",
+    "Drive",
     "ExecutorError",
     "MissingExtraError",
     "RefusedError",
     "ServiceError",
+    "Shaft",
     "SpecError",
     "SpecFileError",
     "SpragError",
@@ -105,8 +110,8 @@ def __getattr__(name: str) -> Any:
         return version("sprag-study")
     if name in _OF_CLIENT:
         return getattr(import_module("sprag_study.service.client"), name)
-    if name in _ERRORS:
-        return getattr(import_module(_ERRORS[name]), name)
+    if name in _OF_BASE:
+        return getattr(import_module(_OF_BASE[name]), name)
     extras = import_module("sprag_study.service.extras")
     if name == "engine":
         return import_module("sprag_study.engine")

@@ -1,7 +1,7 @@
 """Makes what of the client is not written by hand: ``python -m tests.service.client.generate``.
 
 Its methods of views are made of the descriptions of the views (`tests.service.client.view_methods`), the synchronous
-client of the asynchronous one.
+client of the asynchronous one, the classes of drafts of the schema of the spec (`tests.service.client.draft_classes`).
 """
 
 from __future__ import annotations
@@ -11,12 +11,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tests.service.client import view_methods
+from tests.service.client import draft_classes, view_methods
 
 ROOT = Path(__file__).resolve().parents[3]
 SOURCE = ROOT / "service" / "client" / "asynchronous"
 TARGET = SOURCE.with_name("synchronous")
 VIEWS = SOURCE / "views.py"
+MACHINES = SOURCE.with_name("machines")
 #: Words and what stands for them, in this order.
 WORDS = (
     (r"\basync (def|for|with)\b", r"\1"),
@@ -43,10 +44,14 @@ def synchronous(text: str) -> str:
     return text
 
 
-def write(folder: Path, views: Path = VIEWS) -> None:
-    """Write the methods of views, and the modules of the synchronous client but its first one."""
+def write(folder: Path, views: Path = VIEWS, machines: Path = MACHINES) -> None:
+    """Write the methods of views, the classes of drafts, and the synchronous client but its first module."""
     views.write_text(view_methods.module(), encoding="utf-8")
     laid_out([views])
+    machines.mkdir(exist_ok=True)
+    for name, text in draft_classes.modules().items():
+        (machines / f"{name}.py").write_text(text, encoding="utf-8")
+    laid_out(sorted(machines.glob("*.py")))
     made = [folder / path.name for path in sorted(SOURCE.glob("[a-z]*.py"))]
     for path in made:
         source = views if path.name == VIEWS.name else SOURCE / path.name
@@ -56,7 +61,10 @@ def write(folder: Path, views: Path = VIEWS) -> None:
 
 def laid_out(made: list[Path]) -> None:
     """Order and lay out modules by ruff."""
-    for command in (["check", "--fix-only", "--unsafe-fixes", "--select", "I,SIM117,UP028,C416,PIE790"], ["format"]):
+    for command in (
+        ["check", "--fix-only", "--unsafe-fixes", "--select", "F401,I,SIM117,UP028,C416,PIE790"],
+        ["format"],
+    ):
         run = [
             sys.executable,
             "-m",

@@ -176,8 +176,10 @@ def test_and_a_command_unless_a_reason_is_given(
 def test_the_synchronous_client_is_made_from_the_asynchronous_one(tmp_path: Path) -> None:
     folder = tmp_path / "service" / "client" / "synchronous"
     folder.mkdir(parents=True)
-    views = tmp_path / "views.py"
-    generate.write(folder, views)
+    views, machines = tmp_path / "views.py", tmp_path / "machines"
+    generate.write(folder, views, machines)
+    for path in machines.glob("*.py"):
+        assert path.read_text() == (generate.MACHINES / path.name).read_text(), "run the module `generate`"
     assert views.read_text() == generate.VIEWS.read_text(), "run python -m tests.service.client.generate"
     made = {path.name: path.read_text() for path in folder.glob("*.py")}
     kept = {path.name: path.read_text() for path in generate.TARGET.glob("[a-z]*.py")}

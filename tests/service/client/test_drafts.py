@@ -1,0 +1,130 @@
+"""Specs written in Python: the classes of the models, their methods, and the names of parameters."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sprag_study as sprag
+from sprag_study.service.client import ArgumentError
+from sprag_study.service.plain_data import plain
+from sprag_study.service.presets import preset_names
+from sprag_study.service.spec.document import parse_spec
+from sprag_study.worker import models
+
+CLASSES: dict[str, Any] = {"vibration-drive": sprag.Drive, "machine-shaft": sprag.Shaft}
+PENDULUM: dict[str, Any] = {
+    "inertia": 1e-3, "mass": 0.5, "arm": "30 mm", "spring_rate": 9000, "spring_arm": "50 mm", "damping": 0.01,
+}  # fmt: skip
+
+
+def drive(pendulums: int = 1) -> sprag.Drive:
+    return sprag.Drive(
+        excitation={"frequency": "25 Hz", "amplitude_x": "2 mm", "amplitude_y": "2 mm"},
+        pendulums=[PENDULUM] * pendulums,
+        shaft={"inertia": 2e-3},
+        clutch={"coefficients": [0, 200, 0, 20000]},
+        run={"duration": "60 periods"},
+    )
+
+
+def cases(draft: Any) -> int:
+    data, faults = plain(draft)
+    assert not faults
+    return parse_spec(data).study.cases
+
+
+def test_every_model_has_a_class() -> None:
+    assert {kind._model for kind in CLASSES.values()} == set(models.model_names())
+
+
+def test_every_preset_is_a_draft_of_its_model() -> None:
+    for name in preset_names():
+        spec = sprag.preset(name)
+        draft = CLASSES[spec["model"]].of(name)
+        assert dict(draft) == spec
+        assert repr(draft).startswith(f"{type(draft).__name__}({spec['name']!r}")
+
+
+def test_every_parameter_of_a_drive_has_its_name() -> None:
+    spec = parse_spec(plain(drive(2))[0]).study
+    for path in spec.base:
+        if ".coefficients." not in path:
+            assert drive(2).path(path) == path
+            assert path.replace(".0.", ".*.").replace(".1.", ".*.") in sprag.Drive._parameters
+
+
+def test_values_of_any_kind_vary_by_name() -> None:
+    draft = drive().vary(load=np.linspace(0.0, 0.4, 3), frequency=["20 Hz", "25 Hz"])
+    assert cases(draft) == 6
+    assert [axis["path"] for axis in draft["axes"]] == ["shaft.load", "excitation.frequency"]
+    assert "axes" not in drive()
+    assert cases(draft.vary({"shaft.load": "0 to 1 N*m step 0.5 N*m"})) == 6
+    assert cases(draft.vary(shaft__load={"geomspace": ["0.1 N*m", "1 N*m", 4]})) == 8
+    assert repr(draft) == "Drive(varies shaft.load, excitation.frequency)"
+    held = draft.hold(load="0.3 N*m", excitation__frequency=21.5)
+    assert cases(held) == 1
+    assert (held["base"]["shaft"]["load"], held["base"]["excitation"]["frequency"]) == ("0.3 N*m", 21.5)
+    assert cases(draft) == 6
+    second = drive(2).hold({"pendulums.1.mass": "0.4 kg"})
+    assert [pendulum["mass"] for pendulum in second["base"]["pendulums"]] == [0.5, "0.4 kg"]
+
+
+@pytest.mark.parametrize(
+    ("name", "allowed"),
+    [
+        ("lod", "load"),
+        ("inertia", "one of the paths pendulums.0.inertia, pendulums.1.inertia, shaft.inertia"),
+        ("mass", "one of the paths pendulums.0.mass, pendulums.1.mass"),
+    ],
+)
+def test_a_name_that_is_none_or_several_is_refused(name: str, allowed: str) -> None:
+    with pytest.raises(ArgumentError, match=f"{name}: .*{allowed}"):
+        drive(2).vary({name: [1.0]})
+
+
+def test_a_draft_of_another_model_is_refused() -> None:
+    with pytest.raises(ArgumentError, match="a spec of the model 'vibration-drive'"):
+        sprag.Drive.of("press")
+    with pytest.raises(sprag.SpecFileError):
+        sprag.Drive.of("nothing")
+
+
+def test_goals_are_written_by_name() -> None:
+    draft = drive().goal(
+        vary={"frequency": ("20 Hz", "35 Hz"), "shaft__inertia": ["1e-3 kg*m^2", "2e-3 kg*m^2"]},
+        best={"shaft.speed.mean": "max"},
+        subject_to=["torque.max <= 3 N*m"],
+        population=8,
+        generations=2,
+    )
+    assert draft["goal"] == {
+        "vary": [
+            {"path": "excitation.frequency", "from": "20 Hz", "to": "35 Hz"},
+            {"path": "shaft.inertia", "values": ["1e-3 kg*m^2", "2e-3 kg*m^2"]},
+        ],
+        "best": [{"result": "shaft.speed.mean", "max": True}],
+        "subject_to": [{"result": "torque.max", "at_most": "3 N*m"}],
+        "population": 8,
+        "generations": 2,
+    }
+    assert cases(draft) == 8
+    assert repr(draft) == "Drive(goal)"
+    with pytest.raises(ArgumentError, match="'min', 'max'"):
+        drive().goal(vary={"frequency": (20, 35)}, best={"efficiency": "largest"})
+
+
+def test_other_studies_and_fields_are_written_too() -> None:
+    assert cases(drive().set(name="batch", tolerances={"mass": "5 %"}, drives=8)) == 9
+    refined = drive().vary(load={"adaptive": ["0 N*m", "1 N*m"]}).refine(results="shaft.speed.mean")
+    assert refined["refine"] == {"results": ["shaft.speed.mean"]}
+    assert cases(refined) > 1
+    assert cases(sprag.Shaft.of("press").vary(mean_speed=["60 rpm"])) == 13
+
+
+def test_a_draft_is_run_as_any_spec_is() -> None:
+    with sprag.run(drive().vary(load=[0.0, 0.1]), processes=0) as study:
+        assert len(study) == 2
+        assert study.name == "untitled"
