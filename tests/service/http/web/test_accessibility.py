@@ -58,6 +58,7 @@ PAGES: Final[dict[str, list[str]]] = {
     "/help/{name}": ["/help/theory", "/help/guide"],
     "/problems/{slug}": ["/problems/not-found"],
     "/me/audit": ["/me/audit"],
+    "/me/settings": ["/me/settings"],
     "/me/users": ["/me/users"],
     "/nights": ["/nights"],
     "/nights/new": ["/nights/new"],
