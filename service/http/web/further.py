@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, Any
 from fastapi import Request
 from starlette.responses import RedirectResponse, Response
 
-from sprag_study.sentences import Place, Sentence, WarningText
+from sprag_study.sentences import Sentence, WarningText
 from sprag_study.service.faults import FaultError, parameter_error
 from sprag_study.service.http.context import Ctx, StudyId
 from sprag_study.service.http.routers import page_router
-from sprag_study.service.http.web.form.entries import Faults, Values, items_of, list_of
+from sprag_study.service.http.web.form.entries import Faults, Values, doubtful, items_of, list_of
 from sprag_study.service.http.web.form.values import Form
 from sprag_study.service.http.web.sheet.drawer import with_query
 from sprag_study.service.http.web.study import shown_study
 from sprag_study.service.http.work import Attended
 from sprag_study.service.jobs import checks
 from sprag_study.service.reading.faults import message
-from sprag_study.service.reading.numbers import assumption, parse_number, settle
+from sprag_study.service.reading.numbers import parse_number
 from sprag_study.service.spec.text import Body
 from sprag_study.worker.limits import MAX_PRIORITY
 
@@ -96,14 +96,9 @@ def _axes(values: Values) -> list[dict[str, Any]]:
 
 def _doubts(values: Values) -> list[WarningText]:
     """Points of bare numbers that are taken as decimal; the spec warns of those with units."""
-    found = []
-    for name, text in values.items():
-        items = items_of(text) if name.startswith("axis:") else []
-        doubt = settle(items).doubt
-        if doubt is not None and parse_number(items[doubt]) is not None:
-            place = Place("/axes", name.removeprefix("axis:"))
-            found.append(WarningText(assumption(items[doubt]), "ambiguous-point").at(place))
-    return found
+    lists = {name.removeprefix("axis:"): text for name, text in values.items() if name.startswith("axis:")}
+    read = [(path, items_of(text), list_of(text)) for path, text in lists.items()]
+    return [note for path, items, entries in read for note in doubtful(items, entries, ["/axes"] * len(items), path)]
 
 
 def _addition(values: Values) -> dict[str, Any]:

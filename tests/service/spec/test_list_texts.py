@@ -225,3 +225,11 @@ def test_a_comma_of_a_language_with_decimal_commas_is_certain_for_its_list() -> 
     assert one.spec["axes"][0]["values"] == ["1.2500 N*mm"]
     assert not [note for found in (mixed, between, one) for note in (*found.notes, *found.warnings)]
     assert not [note for found in (mixed, between, one) if found.parsed for note in found.parsed.warnings]
+
+
+def test_a_point_in_doubt_is_told_once_and_only_of_the_question_that_is_asked() -> None:
+    with_unit = check_form(form(way="values", values="1.000; 5.000 N*mm"), Chunking())
+    assert with_unit.parsed is not None
+    assert not with_unit.notes  # the spec warns of it
+    other = {**form(way="values", values="1; 5"), "at": "1", "/goal/at/0/path": LOAD, "/goal/at/0/values": "1.000; 2"}
+    assert not check_form(other, Chunking()).notes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode
 
@@ -19,6 +19,7 @@ from sprag_study.service.http.web.form.machine_spec import step_of
 from sprag_study.service.http.web.form.spec import form_with_spec
 from sprag_study.service.http.web.form.walk import Filled
 from sprag_study.service.jobs.preview import preview_json
+from sprag_study.service.jobs.submission import Order, Submission, submission
 from sprag_study.service.languages import _, gettext, grouped, ngettext
 from sprag_study.service.reading.faults import message
 from sprag_study.service.reading.quantities import TYPED
@@ -28,6 +29,7 @@ from sprag_study.service.results.draft_words import draft_words
 from sprag_study.service.schedules.deadline import ALLOWED, FinishError, finish_at
 from sprag_study.service.spec.document import ParsedSpec, SpecError, load_spec, parse_spec
 from sprag_study.service.spec.measured import MeasuredDataError, parse_measured
+from sprag_study.service.views.library import Library
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -70,8 +72,7 @@ class Checked:
         """What the button that submits the study says: how many cases, and how long they take."""
         if self.preview is None:
             return gettext("Run")
-        count, seconds = self.preview["most_cases"], self.preview["estimated_seconds"]
-        time = gettext("about {time}", time=duration(seconds)) if seconds >= 1.0 else duration(seconds)
+        count, time = self.preview["most_cases"], _time(self.preview)
         if self.preview["most_rounds"] > 1:
             return gettext("Run at most {n} cases, {time}", n=grouped(count), time=time)
         return ngettext("Run {n} case, {time}", "Run {n} cases, {time}", count, n=grouped(count), time=time)
@@ -118,7 +119,9 @@ def look_over(
         checked.faults["finish_by"], checked.parsed, checked.preview = [fault], None, None
     if checked.parsed is not None and checked.preview is not None:
         reading = reading_for(checked.parsed.study, checked.parsed.spec, choice or Choice(TYPED))
-        checked.words = _words(checked.parsed, checked.preview, reading)
+        checked.words = draft_words(
+            checked.parsed.study, checked.parsed.spec, checked.preview, reading, _time(checked.preview)
+        )
         for text in checked.preview["warnings"]:
             name, told = _placed(text, checked.form)
             if name and told is not None:
@@ -126,6 +129,23 @@ def look_over(
             else:
                 checked.warnings = (*checked.warnings, reading.warning(text))
     return checked
+
+
+def checked_form(library: Library, values: Mapping[str, str], now: datetime, choice: Choice) -> Checked:
+    """Check a form in a process; ``choice`` as of `look_over`."""
+    store = library.store
+    checked = look_over(values, store.dispatchers.chunking, store.reuse.count, now, choice)
+    # The study itself is not returned: it can be large, and no page shows it.
+    return replace(checked, parsed=None, form=None)
+
+
+def submitted_form(library: Library, values: Mapping[str, str], now: datetime) -> tuple[Checked, Submission | None]:
+    """Check a form in a process; also its study, None where the form has faults."""
+    store = library.store
+    checked = look_over(values, store.dispatchers.chunking, store.reuse.count, now)
+    parsed, finish = checked.parsed, checked.finish
+    made = None if parsed is None else submission(parsed, store, Order(now, finish_by=finish))
+    return replace(checked, parsed=None, form=None), made
 
 
 def _placed(text: str, form: Filled | None) -> tuple[str, WarningText | None]:
@@ -138,11 +158,10 @@ def _placed(text: str, form: Filled | None) -> tuple[str, WarningText | None]:
     return form.field_of(place.pointer), WarningText(told)
 
 
-def _words(parsed: ParsedSpec, preview: Preview, reading: Reading) -> str:
-    """The study in a sentence."""
+def _time(preview: Preview) -> str:
+    """How long the cases take, in words."""
     seconds = preview["estimated_seconds"]
-    time = gettext("about {time}", time=duration(seconds)) if seconds >= 1.0 else duration(seconds)
-    return draft_words(parsed.study, parsed.spec, preview, reading, time)
+    return gettext("about {time}", time=duration(seconds)) if seconds >= 1.0 else duration(seconds)
 
 
 def check_form(

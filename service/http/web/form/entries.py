@@ -6,7 +6,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from sprag_study.service.reading.numbers import in_language, settled, with_point
+from sprag_study.sentences import Place, WarningText
+from sprag_study.service.reading.numbers import assumption, in_language, settle, settled, with_point
 from sprag_study.service.reading.printed import could_be_values, keyboard
 from sprag_study.service.reading.together import split_list, with_last_unit, with_unit_of_range
 
@@ -50,6 +51,18 @@ def unclear(entries: Sequence[Any]) -> bool:
 def items_of(text: str) -> list[str]:
     """The items of a list as texts, with decimal points."""
     return settled([in_language(item) for item in split_list(text)])
+
+
+def doubtful(items: Sequence[str], entries: Sequence[Any], pointers: Sequence[str], path: str) -> list[WarningText]:
+    """What is said of the first bare number of texts with decimal points whose point could separate thousands.
+
+    ``entries`` and ``pointers`` are those of the texts, which are about the number at ``path``. The spec warns of
+    numbers with units.
+    """
+    doubt = settle(items).doubt
+    if doubt is None or isinstance(entries[doubt], str):
+        return []
+    return [WarningText(assumption(items[doubt]), "ambiguous-point").at(Place(pointers[doubt], path))]
 
 
 def list_text(values: str | Sequence[Any]) -> str:

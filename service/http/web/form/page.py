@@ -24,9 +24,8 @@ from sprag_study.service.http.respond import json_response
 from sprag_study.service.http.routers import page_router
 from sprag_study.service.http.threads import in_thread
 from sprag_study.service.http.views import preset_of
-from sprag_study.service.http.web.form import study_check
 from sprag_study.service.http.web.form.beginning import beginning, examples_of
-from sprag_study.service.http.web.form.check import Checked
+from sprag_study.service.http.web.form.check import Checked, checked_form, submitted_form
 from sprag_study.service.http.web.form.columns import take_columns
 from sprag_study.service.http.web.form.components import component_groups, rows_with_components, take_component
 from sprag_study.service.http.web.form.entries import Values, plain, text_of
@@ -115,18 +114,12 @@ async def new_study(
             return await in_thread(form_page, request, empty(model), None)
         spec = {**without_cases(await in_thread(beginning, model)), "axes": []}
         spec.pop("name", None)
-    fields = True
-    try:
-        values = values_of(spec)
-        if clone is None and preset is None:
-            values |= {
-                name: text_of(int(number) if number.is_integer() else number)
-                for name, number in _read_numbers(values).items()
-            }
-    except ValueError:
-        fields = mode == "text"
-    if mode == "text" or not fields:
-        values = {"/text": spec_text(spec), "format": "json"}
+    values, fields = _shown(spec, text=mode == "text")
+    if clone is None and preset is None and "/text" not in values:
+        values |= {
+            name: text_of(int(number) if number.is_integer() else number)
+            for name, number in _read_numbers(values).items()
+        }
     if clone is not None and case is None and "/name" in values:
         values["/name"] = f"{values['/name']} (copy)"
     if clone is not None and "/text" not in values:
@@ -223,7 +216,7 @@ async def send_form(context: Ctx, work: Attended, request: Request, values: Form
         _settle(values)
         share(values)
     if wanted == "submit":
-        checked, made = await work.check(study_check.form_study, context.library, values, context.store.clock.now())
+        checked, made = await work.check(submitted_form, context.library, values, context.store.clock.now())
         return await in_thread(_submit, context, request, values, checked, made)
     reshape(values, wanted)
     if wanted == "take-component":
@@ -275,7 +268,7 @@ async def check(context: Ctx, work: Attended, request: Request, values: Form) ->
             "beside": checked.beside,
             "run": checked.run,
             "panel": fragment("_form_panel.html", checked=checked, address=_address(request)),
-            "pictures": [] if "/text" in values else _sheet(request, values, checked).pictures,
+            "pictures": [] if "/text" in values else _sheet(request, values, checked, _choices(values)).pictures,
             "fits": {
                 pointer: fragment("_form_fit.html", fit=fit, chart=chart, pointer="")
                 for pointer, (fit, chart) in checked.fits.items()
@@ -287,7 +280,7 @@ async def check(context: Ctx, work: Attended, request: Request, values: Form) ->
 
 async def look_over(context: Context, work: Work, values: Mapping[str, str]) -> Checked:
     """Check a form, given by fields or as text."""
-    return await work.check(study_check.form, context.library, values, context.store.clock.now(), current().choice)
+    return await work.check(checked_form, context.library, values, context.store.clock.now(), current().choice)
 
 
 def form_page(
@@ -318,7 +311,8 @@ def sheet_form(request: Request, values: Values, checked: Checked | None, opened
     reading = _reading(values)
     values = values if text_mode else with_own_units(values, reading)
     parts = parts_of(values)
-    sheet = None if text_mode else _sheet(request, values, checked, opened)
+    choices = [] if text_mode else _choices(values)
+    sheet = None if text_mode else _sheet(request, values, checked, choices, opened)
     rows = {} if text_mode else {name: range(count_of(values, name)) for name in parts}
 
     def results(*, numbers: bool = False) -> Groups:
@@ -340,7 +334,7 @@ def sheet_form(request: Request, values: Values, checked: Checked | None, opened
         "rows": rows,
         "search": is_search(values),
         "kept": _kept(values),
-        "choices": [] if text_mode else _choices(values),
+        "choices": choices,
         "components": [] if text_mode else component_groups(values, request.app.state.context.store.components.all()),
         "component_rows": rows_with_components(values),
         "undoable": bool(history_of(values)),
@@ -373,7 +367,7 @@ def _settle(values: Values) -> None:
     with_shown_units(values, _reading(values))
 
 
-def _sheet(request: Request, values: Values, checked: Checked, opened: str = "") -> Sheet:
+def _sheet(request: Request, values: Values, checked: Checked, choices: Groups, opened: str = "") -> Sheet:
     """The sheet of a form; a machine that has faults is drawn as far as its numbers are known."""
     model, before = model_name(values), None
     if source := values.get("from"):
@@ -384,7 +378,7 @@ def _sheet(request: Request, values: Values, checked: Checked, opened: str = "")
     return sheet_of(
         values,
         checked.sketch or rough_drawings(model, _numbers(values)),
-        _choices(values),
+        choices,
         current().choice.units,
         tolerant=with_batch(values),
         faulty=checked.faults,
@@ -423,13 +417,17 @@ def _without_ticks(values: Values) -> Values:
     return found
 
 
+def _shown(spec: dict[str, Any], *, text: bool = False) -> tuple[Values, bool]:
+    """The values of the form for a spec, as ``text`` or where it has no fields for it; whether it has, if it is to."""
+    if not text:
+        with suppress(ValueError):
+            return values_of(spec), True
+    return {"/text": spec_text(spec), "format": "json"}, text
+
+
 async def spec_in_form(work: Work, spec: dict[str, Any]) -> Response:
     """A spec in the form, or as text where the form cannot show it."""
-    fields = True
-    try:
-        values = values_of(spec)
-    except ValueError:
-        values, fields = {"/text": spec_text(spec), "format": "json"}, False
+    values, fields = _shown(spec)
     checked = await look_over(work.context, work, values)
     return await in_thread(form_page, work.request, values, checked, fields=fields)
 

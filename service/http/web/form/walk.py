@@ -7,24 +7,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Final, Protocol
+from typing import Any, Protocol
 
-from sprag_study.sentences import Place, WarningText
+from sprag_study.sentences import WarningText
 from sprag_study.service.http.web.form.entries import (
     Faults,
     Values,
     count_in,
+    doubtful,
     entries_of,
     items_of,
     plain,
     range_of,
     text_of,
 )
-from sprag_study.service.reading.numbers import assumption, in_language, settle, settled
+from sprag_study.service.http.web.form.machine import BASE
+from sprag_study.service.reading.numbers import in_language, settled
 from sprag_study.service.reading.together import with_last_unit
 from sprag_study.worker.models import form as data
-
-BASE: Final = "/base"
 
 
 @dataclass(slots=True)
@@ -59,19 +59,15 @@ class Filled:
     def listed(self, name: str) -> list[Any]:
         """The entries of a field with a list, as of `list_of`."""
         items = items_of(self.text(name))
-        return self._certain([name] * len(items), items, entries_of(with_last_unit(items)))
+        entries = entries_of(with_last_unit(items))
+        self.doubts += doubtful(items, entries, [f"{self.at}/{name}"] * len(items), self.text("path"))
+        return entries
 
     def ranged(self, names: Sequence[str] = ("from", "to")) -> list[Any]:
         """The entries of fields that are the ends of a range, as of `range_of`."""
         items = settled([in_language(self.text(name)) for name in names])
-        return self._certain(names, items, list(range_of(self.values, f"{self.at}/", names).values()))
-
-    def _certain(self, names: Sequence[str], items: Sequence[str], entries: list[Any]) -> list[Any]:
-        """The entries, of which a doubtful one is noted."""
-        doubt = settle(items).doubt
-        if doubt is not None and not isinstance(entries[doubt], str):
-            place = Place(f"{self.at}/{names[doubt]}", self.text("path"))
-            self.doubts.append(WarningText(assumption(items[doubt]), "ambiguous-point").at(place))
+        entries = list(range_of(self.values, f"{self.at}/", names).values())
+        self.doubts += doubtful(items, entries, [f"{self.at}/{name}" for name in names], self.text("path"))
         return entries
 
     def show(self, texts: Mapping[str, str]) -> None:
