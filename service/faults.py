@@ -177,6 +177,18 @@ Kind = Literal[
 ]
 
 
+class ClauseError(ValueError):
+    """A value that is wrong, by itself.
+
+    ``message`` is one clause without the value, a `Sentence` or a text of the catalogue; ``code`` is stable.
+    """
+
+    def __init__(self, code: Code, message: str) -> None:
+        super().__init__(message)
+        self.code: Code = code
+        self.message = message
+
+
 @dataclass(frozen=True, slots=True)
 class Fault:
     """One fault of the input.

@@ -320,11 +320,12 @@ def _telling_what_is_kept() -> Iterator[None]:
 
 def _finish(text: str | None) -> datetime | None:
     """The deadline of an option; WrongInputError when it is invalid."""
-    from sprag_study.service.schedules.deadline import ALLOWED, FinishError, finish_at
+    from sprag_study.service.schedules.deadline import ALLOWED, finish_at
+    from sprag_study.service.schedules.times import TimingError
 
     try:
         return None if text is None else finish_at(text, datetime.now(UTC))
-    except FinishError as error:
+    except TimingError as error:
         raise wrong_option("--finish-by", error.code, error.message, text, allowed=ALLOWED) from None
 
 

@@ -80,6 +80,8 @@ from sprag_study.service.jobs import checks
 from sprag_study.service.jobs.housekeeping import Housekeeping
 from sprag_study.service.jobs.reports.reporter import Reporter
 from sprag_study.service.jobs.reports.watchdog import Watchdog, late_runs
+from sprag_study.service.schedules.fields import CHANGE as SCHEDULE_CHANGE
+from sprag_study.service.schedules.fields import SCHEDULE
 from sprag_study.service.settings import Settings, UnsafeSettingsError
 from sprag_study.service.spec import components as component_spec
 from sprag_study.service.spec import labels
@@ -211,8 +213,8 @@ class Application(FastAPI):
                 "Components": component_spec.REQUEST.schema(),
                 "SavedView": view_spec.VIEW.schema(),
                 "SavedViewChange": view_spec.CHANGE.schema(),
-                "ScheduleRequest": schedules.SCHEMA,
-                "ScheduleChange": schedules.CHANGE_SCHEMA,
+                "ScheduleRequest": SCHEDULE.schema(),
+                "ScheduleChange": SCHEDULE_CHANGE.schema(),
             }
             self.openapi_schema = build_openapi(self, schemas, self._settings.url_prefix)
         return self.openapi_schema

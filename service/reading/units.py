@@ -21,7 +21,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 from sprag_study.sentences import Amount, Sentence, Typed, joined, plural
-from sprag_study.service.faults import Code
+from sprag_study.service.faults import ClauseError, Code
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.cyrillic import latin
 from sprag_study.service.reading.numbers import is_ambiguous, with_point
@@ -83,17 +83,12 @@ _SUPERSCRIPTS: Final = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "01234567
 _SIGNS: Final = str.maketrans("\u2212\u2013·⋅×\u2219μ\u00a0\u202f\u2009", "--****µ   ")
 
 
-class QuantityError(ValueError):
-    """A value that is not a quantity of the expected unit.
-
-    ``message`` is a phrase, or a text of the catalogue, without the value; ``code`` is stable.
-    """
+class QuantityError(ClauseError):
+    """A value that is not a quantity of the expected unit."""
 
     def __init__(self, code: Code, message: str) -> None:
-        super().__init__(message)
-        self.code: Code = code
         # Within another sentence it is translated too.
-        self.message = message if isinstance(message, Sentence) else Sentence(message)
+        super().__init__(code, message if isinstance(message, Sentence) else Sentence(message))
 
 
 class AmbiguousCommaError(QuantityError):

@@ -6,7 +6,6 @@ from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Final
 
 from sprag_study.sentences import Amount, Sentence, WarningText, plural
-from sprag_study.service.faults import Code
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.units import QuantityError, parse_quantity, split_quantity
 from sprag_study.service.schedules.times import TimingError, next_time_of_day, read_time_of_day
@@ -38,17 +37,8 @@ ALLOWED_OF_RUNS: Final = Sentence(
 )
 
 
-class FinishError(ValueError):
-    """An invalid deadline; ``message`` is one clause, a sentence or a text of the catalogue."""
-
-    def __init__(self, code: Code, message: str) -> None:
-        super().__init__(message)
-        self.code: Code = code
-        self.message = message
-
-
 def finish_at(text: str, now: datetime) -> datetime:
-    """The deadline (UTC) that ``text`` names at ``now``: a time with its offset, or a duration. Raises FinishError."""
+    """The deadline (UTC) that ``text`` names at ``now``: a time with its offset, or a duration. Raises TimingError."""
     text = text.strip()
     try:
         moment = datetime.fromisoformat(text)
@@ -56,34 +46,34 @@ def finish_at(text: str, now: datetime) -> datetime:
         return now + timedelta(seconds=_seconds_ahead(text))
     if moment.tzinfo is None:
         # An unencoded plus sign in a URL is decoded as a blank.
-        raise FinishError("invalid-time", "has no offset from UTC; write Z, or +01:00 (in an address %2B01:00)")
+        raise TimingError("invalid-time", "has no offset from UTC; write Z, or +01:00 (in an address %2B01:00)")
     try:
         ahead = (moment - now).total_seconds()
         moment = moment.astimezone(UTC)
     except OverflowError:
-        raise FinishError("out-of-range", "is too far away") from None
+        raise TimingError("out-of-range", "is too far away") from None
     if ahead <= 0.0:
         present = now.astimezone(UTC).isoformat(timespec="seconds")
-        raise FinishError("out-of-range", Sentence("is in the past; it is {time} now", time=present))
+        raise TimingError("out-of-range", Sentence("is in the past; it is {time} now", time=present))
     _require_near(ahead)
     return moment
 
 
 def duration_seconds(text: str) -> float:
-    """Seconds of a duration with its unit, 1 s to `MAX_FINISH_DAYS`; raises FinishError."""
+    """Seconds of a duration with its unit, 1 s to `MAX_FINISH_DAYS`; raises TimingError."""
     seconds = _seconds(text, N_("is not a duration with a unit"))
     if not _LEAST_SECONDS <= seconds <= _MOST_SECONDS:
         short = Sentence("is shorter than {time}", time=Amount(_LEAST_SECONDS, "s"))
         long = plural("is longer than {count} day", "is longer than {count} days", MAX_FINISH_DAYS)
-        raise FinishError("out-of-range", short if seconds < _LEAST_SECONDS else long)
+        raise TimingError("out-of-range", short if seconds < _LEAST_SECONDS else long)
     return seconds
 
 
 def _seconds_ahead(text: str) -> float:
-    """Seconds to a deadline that is given as a duration; raises FinishError."""
+    """Seconds to a deadline that is given as a duration; raises TimingError."""
     seconds = _seconds(text, N_("is neither a time nor a duration with a unit"))
     if seconds <= 0.0:
-        raise FinishError("out-of-range", "is not in the future")
+        raise TimingError("out-of-range", "is not in the future")
     _require_near(seconds)
     return seconds
 
@@ -95,16 +85,16 @@ def _seconds(text: str, otherwise: str) -> float:
             return float(number) * seconds
         return parse_quantity(text, "s")
     except QuantityError:
-        raise FinishError("invalid-time", otherwise) from None
+        raise TimingError("invalid-time", otherwise) from None
 
 
 def _require_near(seconds: float) -> None:
     if not _LEAST_SECONDS <= seconds <= _MOST_SECONDS:
-        raise FinishError("out-of-range", "is too soon" if seconds < _LEAST_SECONDS else "is too far away")
+        raise TimingError("out-of-range", "is too soon" if seconds < _LEAST_SECONDS else "is too far away")
 
 
 def check_run_finish(text: str) -> str:
-    """Check and normalise the deadline of a schedule's runs: a time of day or a duration. Raises FinishError."""
+    """Check and normalise the deadline of a schedule's runs: a time of day or a duration. Raises TimingError."""
     text = text.strip()
     try:
         return f"{read_time_of_day(text):%H:%M}"

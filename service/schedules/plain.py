@@ -7,7 +7,8 @@ from typing import Final
 
 from sprag_study.service.languages import N_, gettext
 from sprag_study.service.reading.wording import duration
-from sprag_study.service.schedules.deadline import FinishError, duration_seconds
+from sprag_study.service.schedules.deadline import duration_seconds
+from sprag_study.service.schedules.times import TimingError
 
 #: What follows "day of the week" in a cron expression, and what people say.
 DAYS: Final = {
@@ -44,7 +45,7 @@ def deadline_said(text: str) -> str:
     """What people say of the deadline of each run: a time of day, or how long it may take."""
     try:
         return gettext("finished within {time}", time=duration(duration_seconds(text)))
-    except FinishError:
+    except TimingError:
         return gettext("finished by {time}", time=text)
 
 

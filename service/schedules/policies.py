@@ -93,6 +93,6 @@ def due_times(timing: Timing, policies: Policies, first: datetime, now: datetime
 
 
 def check_grace(text: str) -> str:
-    """Check and normalise a misfire grace; raises FinishError."""
+    """Check and normalise a misfire grace; raises TimingError."""
     duration_seconds(text.strip())
     return text.strip()

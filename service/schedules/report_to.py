@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 from sprag_study.sentences import Sentence, plural
 from sprag_study.service.delivery import is_mail_address, origin_of
+from sprag_study.service.spec.node import Node
 from sprag_study.service.spec.report import Report
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from sprag_study.service.delivery import Delivery
 
 MOST_RECIPIENTS: Final = 10
@@ -49,35 +48,30 @@ class ReportTo:
         return {"report_email": list(self.email), "report_webhook": self.webhook, "report_when": self.when.value}
 
 
-def read_report_to(report: Report, found: Mapping[str, Any], when: str | None) -> ReportTo:
-    """Recipients and webhook of the fields ``found``; faults are noted."""
-    email, webhook = found.get("report_email", []), found.get("report_webhook")
+def read_report_to(schedule: Node, when: str | None) -> ReportTo:
+    """Recipients and webhook of the fields of a schedule; faults are recorded."""
+    recipients, webhook = schedule["report_email"].otherwise([]), schedule["report_webhook"]
+    email = recipients.value
     if not isinstance(email, list):
-        report.fault("/report_email", "wrong-type", "must be a list of addresses", email, allowed=EMAIL_ALLOWED)
+        recipients.refuse("wrong-type", "must be a list of addresses", allowed=EMAIL_ALLOWED)
         email = []
     elif len(email) > MOST_RECIPIENTS:
-        report.fault(
-            "/report_email",
-            "too-many",
-            plural("has {count} address", "has {count} addresses", len(email)),
-            allowed=EMAIL_ALLOWED,
-        )
+        many = plural("has {count} address", "has {count} addresses", len(email))
+        recipients.refuse("too-many", many, None, allowed=EMAIL_ALLOWED)
         email = []
     for number, address in enumerate(email):
-        where = f"/report_email/{number}"
         if not isinstance(address, str) or not is_mail_address(address):
-            report.fault(where, "invalid-text", "is not a mail address", address, allowed=EMAIL_ALLOWED)
+            recipients[number].refuse("invalid-text", "is not a mail address", allowed=EMAIL_ALLOWED)
         elif address in email[:number]:
-            report.fault(where, "repeated", "is given twice", address, allowed=EMAIL_ALLOWED)
-    if webhook is not None and not (
-        isinstance(webhook, str) and len(webhook) <= LONGEST_WEBHOOK and origin_of(webhook) is not None
+            recipients[number].refuse("repeated", "is given twice", allowed=EMAIL_ALLOWED)
+    address = webhook.value
+    if address is not None and not (
+        isinstance(address, str) and len(address) <= LONGEST_WEBHOOK and origin_of(address) is not None
     ):
-        report.fault(
-            "/report_webhook", "invalid-text", "is not the address of a webhook", webhook, allowed=WEBHOOK_ALLOWED
-        )
-    if report.faults:
+        webhook.refuse("invalid-text", "is not the address of a webhook", allowed=WEBHOOK_ALLOWED)
+    if schedule.report.faults:
         return ReportTo()
-    return ReportTo(tuple(email), webhook, ReportWhen(when or ReportWhen.ALWAYS))
+    return ReportTo(tuple(email), address, ReportWhen(when or ReportWhen.ALWAYS))
 
 
 def require_deliverable(wanted: ReportTo, delivery: Delivery) -> None:
@@ -85,36 +79,24 @@ def require_deliverable(wanted: ReportTo, delivery: Delivery) -> None:
 
     Whoever may create a schedule must not reach any address from the network of the service.
     """
-    report = Report(wanted.to_json())
+    data = wanted.to_json()
+    node = Node(Report(data), "", data)
     if wanted.email and delivery.mail_server is None:
-        report.fault(
-            "/report_email",
-            "conflict",
-            "no mail is sent here",
+        node["report_email"].refuse(
+            "conflict", "no mail is sent here", None,
             allowed="none, until the administrator sets a mail server (SPRAG_SMTP_URL)",
-        )
+        )  # fmt: skip
     for number, address in enumerate(wanted.email):
         if not mail_allowed(address, delivery):
             allowed = Sentence("addresses of {domains} (SPRAG_MAIL_DOMAINS)", domains=", ".join(delivery.domains))
-            report.fault(
-                f"/report_email/{number}",
-                "invalid-choice",
-                "has a domain to which no reports go",
-                address,
-                allowed=allowed,
-            )
+            domain = "has a domain to which no reports go"
+            node["report_email"][number].refuse("invalid-choice", domain, allowed=allowed)
     if wanted.webhook is not None and origin_of(wanted.webhook) not in delivery.origins:
         allowed = Sentence("none, until the administrator allows origins (SPRAG_WEBHOOK_ORIGINS)")
         if delivery.origins:
             allowed = Sentence("addresses at {origins} (SPRAG_WEBHOOK_ORIGINS)", origins=", ".join(delivery.origins))
-        report.fault(
-            "/report_webhook",
-            "invalid-choice",
-            "has an origin to which no webhooks go",
-            wanted.webhook,
-            allowed=allowed,
-        )
-    report.raise_if_any()
+        node["report_webhook"].refuse("invalid-choice", "has an origin to which no webhooks go", allowed=allowed)
+    node.report.raise_if_any()
 
 
 def mail_allowed(address: str, delivery: Delivery) -> bool:

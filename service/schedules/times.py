@@ -17,7 +17,7 @@ from zoneinfo import ZoneInfo
 from cronsim import CronSim, CronSimError
 
 from sprag_study.sentences import Sentence
-from sprag_study.service.faults import Code
+from sprag_study.service.faults import ClauseError
 from sprag_study.service.languages import recorded
 from sprag_study.service.schedules.occurrences import Occurrences
 
@@ -35,13 +35,8 @@ ALIASES: Final = {
 MOST_COUNTED = 1000
 
 
-class TimingError(ValueError):
-    """A cron expression or a time that is invalid; ``message`` is one clause, a sentence or a text of the catalogue."""
-
-    def __init__(self, code: Code, message: str) -> None:
-        super().__init__(message)
-        self.code: Code = code
-        self.message = message
+class TimingError(ClauseError):
+    """A cron expression, a time or a duration that is invalid."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,13 +160,18 @@ class Window:
             return True
         return next_time_of_day(self.begin, self.zone, begin) < end
 
+    def to_json(self) -> list[str]:
+        """Its times of day as a client gives them."""
+        return [f"{self.begin:%H:%M}", f"{self.end:%H:%M}"]
+
     def __str__(self) -> str:
         return str(self.sentence)
 
     @property
     def sentence(self) -> Sentence:
         """Its times of day and its zone."""
-        return Sentence(recorded.WINDOW, begin=f"{self.begin:%H:%M}", end=f"{self.end:%H:%M}", zone=self.zone)
+        begin, end = self.to_json()
+        return Sentence(recorded.WINDOW, begin=begin, end=end, zone=self.zone)
 
 
 def next_time_of_day(clock: time, zone: str, moment: datetime) -> datetime:

@@ -6,14 +6,10 @@ from typing import TYPE_CHECKING
 
 from sprag_study.sentences import Sentence
 from sprag_study.service.reading.texts import did_you_mean
-from sprag_study.service.spec.report import Report
 from sprag_study.worker import models
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from typing import Any
-
-_FIELD = "/trouble_flags"
+    from sprag_study.service.spec.node import Node
 
 
 def usual_flags(model: str) -> tuple[str, ...]:
@@ -22,35 +18,33 @@ def usual_flags(model: str) -> tuple[str, ...]:
     return tuple(name for name in known.flags if name in known.unsettled)
 
 
-def read_trouble_flags(report: Report, found: Mapping[str, Any], model: str | None) -> tuple[str, ...] | None:
-    """The flags that the fields ``found`` name, each of them one of ``model``; None: `usual_flags`. Faults are noted.
+def read_trouble_flags(node: Node, model: str | None) -> tuple[str, ...] | None:
+    """The flags that a schedule names, each of them one of ``model``; None: `usual_flags`. Faults are recorded.
 
     With ``model`` None, because the spec is wrong, names are not compared.
     """
-    value = found.get("trouble_flags")
-    if value is None:
+    if node.value is None:
         return None
     known = () if model is None else tuple(models.flags_of(model))
     names = ", ".join(known)
-    if not isinstance(value, list):
+    if not isinstance(node.value, list):
         allowed = Sentence("a list of {names}", names=names) if known else Sentence("an empty list")
-        report.fault(_FIELD, "wrong-type", "must be a list of flags", value, allowed=allowed)
+        node.refuse("wrong-type", "must be a list of flags", allowed=allowed)
         return None
-    seen: set[str] = set()
-    for number, flag in enumerate(value):
-        where = f"{_FIELD}/{number}"
-        if report.full:
+    allowed_name, flags = names if known else "no flag", list[str]()
+    for item in node.parts():
+        flag = item.value
+        if node.report.full:
             break
         if not isinstance(flag, str):
-            report.fault(where, "wrong-type", "must be the name of a flag", flag, allowed=names if known else "no flag")
-        elif flag in seen:
-            report.fault(where, "repeated", "is given twice", flag, allowed=names if known else "no flag")
+            item.refuse("wrong-type", "must be the name of a flag", allowed=allowed_name)
+        elif flag in flags:
+            item.refuse("repeated", "is given twice", allowed=allowed_name)
         elif model is not None and flag not in known:
-            hint = did_you_mean(flag, known)
-            message = Sentence("is not a flag of the model {model}{hint}", model=model, hint=hint)
+            message = Sentence("is not a flag of the model {model}{hint}", model=model, hint=did_you_mean(flag, known))
             if not known:
                 message = Sentence("is not a flag of the model {model}, which has none", model=model)
-            report.fault(where, "unknown-name", message, flag, allowed=names if known else "no flag")
+            item.refuse("unknown-name", message, allowed=allowed_name)
         else:
-            seen.add(flag)
-    return tuple(flag for flag in value if isinstance(flag, str))
+            flags.append(flag)
+    return tuple(flags)

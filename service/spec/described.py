@@ -298,11 +298,6 @@ def choice(
     return Described(name, label, help, "choice", default=default, choices=choices)
 
 
-def schemas(fields: dict[str, Described]) -> dict[str, Any]:
-    """JSON Schemas by name."""
-    return {name: field.schema() for name, field in fields.items()}
-
-
 def named(*fields: Described) -> dict[str, Described]:
     return {field.name: field for field in fields}
 

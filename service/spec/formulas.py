@@ -15,7 +15,7 @@ from fractions import Fraction
 from typing import Final
 
 from sprag_study.sentences import Part, Sentence, Typed, joined, plural
-from sprag_study.service.faults import Code
+from sprag_study.service.faults import ClauseError
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.cyrillic import latin
 from sprag_study.service.reading.units import QuantityError, is_unit, measure, plain_signs, to_float
@@ -59,13 +59,8 @@ _JOINS: Final = {"+": N_("adds {one} and {other}{hint}"), "-": N_("subtracts {on
 _COMPARES: Final = N_("'{function}' compares {one} and {other}{hint}")
 
 
-class FormulaError(ValueError):
-    """A formula that cannot be used. ``message`` is a phrase without the formula; ``code`` is stable."""
-
-    def __init__(self, code: Code, message: str) -> None:
-        super().__init__(message)
-        self.code: Code = code
-        self.message = message
+class FormulaError(ClauseError):
+    """A formula that cannot be used."""
 
 
 class UnknownNameError(FormulaError):

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from sprag_study.sentences import Amount, Sentence, plural
+from sprag_study.service.faults import ClauseError
 from sprag_study.service.reading.catalogue import range_sentence
 from sprag_study.service.reading.limits import one_of, quoted, span
 from sprag_study.service.reading.numbers import parse_number
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from sprag_study.service.faults import Code
     from sprag_study.service.spec.machine.machine import Machine
     from sprag_study.worker.models import Parameter
+
+R = TypeVar("R")
 
 _ITSELF: Final = object()
 
@@ -108,6 +111,14 @@ class Node:
         missing = self.value is None
         self.refuse("required" if missing else "wrong-type", "is required" if missing else message, allowed=allowed)
 
+    def parsed(self, parse: Callable[[Any], R], *, allowed: str | None = None, unit: str | None = None) -> R | None:
+        """What ``parse`` makes of the value; None, and a fault recorded, where it raises `ClauseError`."""
+        try:
+            return parse(self.value)
+        except ClauseError as error:
+            self.refuse(error.code, error.message, allowed=allowed, unit=unit)
+            return None
+
     def exact(self, parameter: Parameter) -> Fraction | None:
         """The exact SI number of a quantity in ``parameter``'s range."""
         if self.report.full:
@@ -161,11 +172,10 @@ class Node:
     def periods(self, low: int, high: int) -> int | None:
         """A text with a whole number of excitation periods."""
         allowed = Sentence('{low} to {high} whole excitation periods, as in "1000 periods"', low=low, high=high)
-        try:
-            number, unit = split_quantity(self.value) if isinstance(self.value, str) else (None, "")
-        except QuantityError as error:
-            self.refuse(error.code, error.message, allowed=allowed)
+        split = self.parsed(split_quantity, allowed=allowed) if isinstance(self.value, str) else (None, "")
+        if split is None:
             return None
+        number, unit = split
         if number is None or unit not in PERIOD_NAMES:
             self.refuse("wrong-type", "must be a number of excitation periods", allowed=allowed)
         elif number.denominator != 1 or not low <= number <= high:

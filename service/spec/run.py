@@ -136,26 +136,23 @@ def time_text(time: Time) -> str:
 
 def _read_time(node: Node, *, positive: bool = False) -> Time | None:
     allowed = Sentence("{range}, in {units}", range="> 0" if positive else ">= 0", units=Sentence(_TIME))
-    try:
-        unit = "s"
-        if isinstance(node.value, str):
-            number, text = split_quantity(node.value)
-            if text in PERIOD_NAMES:
-                unit = "periods"
-            elif not text:
-                raise QuantityError("missing-unit", "a text needs its unit: periods or s")
-            else:
-                number = parse_exact(node.value, "s")
-        else:
-            number = exact_number(node.value, "s")
-        seconds = to_float(number)
-    except QuantityError as error:
-        node.refuse(error.code, error.message, allowed=allowed)
-        return None
-    if seconds < 0.0 or (positive and seconds == 0.0) or seconds > _MAX_SECONDS:
+    time = node.parsed(_time, allowed=allowed)
+    if time is not None and (time[0] < 0.0 or (positive and time[0] == 0.0) or time[0] > _MAX_SECONDS):
         node.refuse("out-of-range", "is out of range", allowed=allowed)
         return None
-    return [seconds + 0.0, unit]
+    return time
+
+
+def _time(value: object) -> Time:
+    """A number of seconds, or a text with periods or a unit of time; raises QuantityError."""
+    if not isinstance(value, str):
+        return [to_float(exact_number(value, "s")) + 0.0, "s"]
+    number, unit = split_quantity(value)
+    if not unit:
+        raise QuantityError("missing-unit", "a text needs its unit: periods or s")
+    if unit in PERIOD_NAMES:
+        return [to_float(number) + 0.0, "periods"]
+    return [to_float(parse_exact(value, "s")) + 0.0, "s"]
 
 
 def _read_window(node: Node) -> list[Time] | None:

@@ -22,98 +22,16 @@ from sprag_study.service.http.work import Attended, Work
 from sprag_study.service.jobs import checks
 from sprag_study.service.jobs.nights import HOURS, MOST_HOURS, night
 from sprag_study.service.jobs.submission import hash_of
-from sprag_study.service.schedules.deadline import ALLOWED_OF_RUNS
-from sprag_study.service.schedules.fields import PLAIN, ScheduleFields
-from sprag_study.service.schedules.policies import GRACE_ALLOWED
-from sprag_study.service.schedules.report_to import LONGEST_WEBHOOK, MOST_RECIPIENTS, require_deliverable
-from sprag_study.service.schedules.times import ALIASES
-from sprag_study.service.spec.described import schemas
+from sprag_study.service.schedules.fields import ScheduleFields
+from sprag_study.service.schedules.report_to import require_deliverable
 from sprag_study.service.storage.errors import ChangedMeanwhileError
 from sprag_study.service.storage.people.audit import require_edition
 from sprag_study.service.storage.schedules.runs import ScheduleRecord
-from sprag_study.worker.codes import FLAG_MASKS
-from sprag_study.worker.limits import MAX_NAME_LENGTH
 
 router = api_router("schedules")
 
 #: Attempts to change a schedule that somebody else changes at the same time.
 _ATTEMPTS: Final = 5
-_TIME_OF_DAY: Final = {"type": "string", "pattern": "^([01]?[0-9]|2[0-3]):[0-5][0-9]$"}
-_FIELDS: Final[dict[str, Any]] = {
-    "name": {
-        "type": ["string", "null"],
-        "minLength": 1,
-        "maxLength": MAX_NAME_LENGTH,
-        "description": "name of its studies; by default the spec's name",
-    },
-    "spec": {"$ref": "#/components/schemas/Spec"},
-    "cron": {
-        "type": ["string", "null"],
-        "description": "recurring: minute, hour, day of the month, month, day of the week, in `zone`; or "
-        + ", ".join(f"`{name}`" for name in ALIASES),
-    },
-    "at": {
-        "type": ["string", "null"],
-        "description": "once: a future time, in `zone` unless it has its own offset",
-    },
-    "zone": {"type": "string", "default": "UTC", "description": "name of the time zone"},
-    "window": {
-        "type": ["array", "null"],
-        "minItems": 2,
-        "maxItems": 2,
-        "items": _TIME_OF_DAY,
-        "description": "its studies run between these times of day, in `zone`, and are held outside",
-    },
-    **schemas(PLAIN),
-    "finish_by": {
-        "type": ["string", "null"],
-        "maxLength": 80,
-        "description": f"deadline: each study is run coarse to fine and held then: {ALLOWED_OF_RUNS}",
-    },
-    "misfire_grace": {
-        "type": ["string", "null"],
-        "maxLength": 80,
-        "description": f"longest delay with which a due time is still run; null: any; {GRACE_ALLOWED}",
-    },
-    "paused_until": {
-        "type": ["string", "null"],
-        "description": "the schedule is not due before: a future time, in `zone` unless it has its own offset",
-    },
-    "trouble_flags": {
-        "type": ["array", "null"],
-        "uniqueItems": True,
-        "items": {"enum": list(FLAG_MASKS)},
-        "default": None,
-        "description": "a run with a case that has one of these flags of its model needs attention; an empty list: "
-        "flags do not matter; null: those of motions that had not settled, `unsettled` and `not_settled`",
-    },
-    "report_email": {
-        "type": "array",
-        "maxItems": MOST_RECIPIENTS,
-        "items": {"type": "string", "format": "email", "maxLength": 254},
-        "default": [],
-        "description": "addresses to which its runs are reported; needs `SPRAG_SMTP_URL`",
-    },
-    "report_webhook": {
-        "type": ["string", "null"],
-        "maxLength": LONGEST_WEBHOOK,
-        "description": "address to which its runs are reported by a signed POST; its origin must be allowed by "
-        "`SPRAG_WEBHOOK_ORIGINS`",
-    },
-}
-SCHEMA: Final[dict[str, Any]] = {
-    "type": "object",
-    "description": "A study and when it is to run; either `cron` or `at`.",
-    "required": ["spec"],
-    "additionalProperties": False,
-    "properties": _FIELDS,
-}
-CHANGE_SCHEMA: Final[dict[str, Any]] = {
-    "type": "object",
-    "description": "The fields of a schedule to change.",
-    "additionalProperties": False,
-    "properties": _FIELDS,
-}
 EXAMPLE: Final[dict[str, Any]] = {
     "name": "Every working night",
     "cron": "0 22 * * 1-5",

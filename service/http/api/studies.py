@@ -24,7 +24,8 @@ from sprag_study.service.http.threads import in_thread
 from sprag_study.service.http.work import CHECK_PROBLEMS, Attended
 from sprag_study.service.jobs import checks
 from sprag_study.service.results.rounds import round_json
-from sprag_study.service.schedules.deadline import ALLOWED, FinishError, finish_at
+from sprag_study.service.schedules.deadline import ALLOWED, finish_at
+from sprag_study.service.schedules.times import TimingError
 from sprag_study.service.views.curves import pairs
 from sprag_study.worker.limits import (
     MAX_NARROW_STEPS,
@@ -87,7 +88,7 @@ def _finish(context: Context, text: str | None) -> datetime | None:
         return None
     try:
         return finish_at(text, context.store.clock.now())
-    except FinishError as error:
+    except TimingError as error:
         raise parameter_error("finish_by", error.code, error.message, text, ALLOWED) from None
 
 

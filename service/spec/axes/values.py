@@ -14,7 +14,7 @@ from sprag_study.sentences import Sentence, Typed
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.limits import values_to
 from sprag_study.service.reading.ranges import TypedRange, typed_range
-from sprag_study.service.reading.units import QuantityError, parse_exact, to_float
+from sprag_study.service.reading.units import parse_exact, to_float
 from sprag_study.service.spec.lists import read_list, read_list_text, read_together
 from sprag_study.service.spec.node import Node
 from sprag_study.worker.limits import MAX_AXIS_VALUES
@@ -148,12 +148,8 @@ def plan_range(node: Node, parameter: Parameter) -> Plan | None:
         return None
     by = three[2]
     start, stop = three[0].exact(parameter), three[1].exact(parameter)
-    try:
-        step = parse_exact(by.value, parameter.unit)
-    except QuantityError as error:
-        by.refuse(error.code, error.message, unit=parameter.unit)
-        return None
-    if start is None or stop is None:
+    step = by.parsed(lambda value: parse_exact(value, parameter.unit), unit=parameter.unit)
+    if start is None or stop is None or step is None:
         return None
     if step == 0 or (stop - start) * step < 0:
         by.refuse(

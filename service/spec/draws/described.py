@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 from sprag_study.sentences import Amount, Sentence
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.together import split_list
-from sprag_study.service.reading.units import QuantityError, parse_quantity
+from sprag_study.service.reading.units import parse_quantity
 from sprag_study.service.spec.described import Field, Listed, choice
 from sprag_study.service.spec.draws.distributions import SIGMAS
 from sprag_study.service.spec.lists import read_list, read_list_text
@@ -60,10 +60,8 @@ def read_plus_minus(node: Node, parameter: Parameter) -> tuple[bool, float] | No
             node.refuse("out-of-range", "is out of range", allowed=Sentence("{low} % to {high} %", **ends))
             return None
         return True, share
-    try:
-        number = parse_quantity(node.value, parameter.unit)
-    except QuantityError as error:
-        node.refuse(error.code, error.message, allowed=PLUS_MINUS, unit=parameter.unit)
+    number = node.parsed(lambda value: parse_quantity(value, parameter.unit), allowed=PLUS_MINUS, unit=parameter.unit)
+    if number is None:
         return None
     most = min(parameter.high - parameter.low, _LARGEST)
     if not 0.0 < number <= most:

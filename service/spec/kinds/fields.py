@@ -8,7 +8,7 @@ from sprag_study.sentences import Sentence, Typed
 from sprag_study.service.reading.catalogue import result_of, unknown_result
 from sprag_study.service.reading.limits import quoted
 from sprag_study.service.reading.texts import quantity_text
-from sprag_study.service.reading.units import QuantityError, example, parse_quantity
+from sprag_study.service.reading.units import example, parse_quantity
 from sprag_study.service.spec.axes.axes import read_paths
 from sprag_study.service.spec.lists import refuse_mixed
 
@@ -80,9 +80,5 @@ def read_value(node: Node, info: ResultInfo) -> float | None:
             return float(info.categories.index(str(node.value)))
         node.refuse("invalid-choice", "is not a valid choice", allowed=quoted(info.categories))
         return None
-    try:
-        return parse_quantity(node.value, info.unit)
-    except QuantityError as error:
-        such = Sentence("a number of {unit}, for example {example}", unit=Typed(info.unit), example=example(info.unit))
-        node.refuse(error.code, error.message, allowed=such, unit=info.unit)
-        return None
+    such = Sentence("a number of {unit}, for example {example}", unit=Typed(info.unit), example=example(info.unit))
+    return node.parsed(lambda value: parse_quantity(value, info.unit), allowed=such, unit=info.unit)

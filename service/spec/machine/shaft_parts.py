@@ -10,7 +10,7 @@ from typing import Any, Final
 from sprag_study.sentences import Sentence, plural
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.catalogue import range_sentence
-from sprag_study.service.reading.units import QuantityError, parse_quantity
+from sprag_study.service.reading.units import parse_quantity
 from sprag_study.service.spec.described import Described, Field, Listed, Record, choice, named
 from sprag_study.service.spec.machine.shaft_tables import read_csv_rows
 from sprag_study.service.spec.node import Node
@@ -180,12 +180,11 @@ def read_cycle(node: Node) -> int | None:
     most, value = max(machine_shaft.REVOLUTIONS), node.otherwise(1).value
     turns: float | None = None
     if isinstance(value, str):
-        try:
-            turns = parse_quantity(value, "rad") / (2.0 * math.pi)
-        except QuantityError as error:
-            allowed = plural("1 to {count} revolution", "1 to {count} revolutions", most)
-            node.refuse(error.code, error.message, allowed=allowed)
+        allowed = plural("1 to {count} revolution", "1 to {count} revolutions", most)
+        angle = node.parsed(lambda text: parse_quantity(text, "rad"), allowed=allowed)
+        if angle is None:
             return None
+        turns = angle / (2.0 * math.pi)
     elif isinstance(value, int | float) and not isinstance(value, bool):
         turns = float(value)
     for known in machine_shaft.REVOLUTIONS:

@@ -15,7 +15,7 @@ from sprag_study.service.jobs.scheduler import Scheduler
 from sprag_study.service.results.curves import Curve, Map
 from sprag_study.service.results.refined import Line
 from sprag_study.service.schedules.deadline import (
-    FinishError,
+    TimingError,
     check_run_finish,
     finish_at,
     finish_warnings,
@@ -138,7 +138,7 @@ def test_a_time_with_its_offset_or_a_duration_is_a_deadline(text: str, expected:
     ],
 )
 def test_what_is_no_deadline_is_refused(text: str, code: str) -> None:
-    with refused(FinishError, code):
+    with refused(TimingError, code):
         finish_at(text, NOW)
 
 

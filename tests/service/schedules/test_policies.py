@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from sprag_study.service.jobs.scheduler import Scheduler
-from sprag_study.service.schedules.deadline import FinishError
 from sprag_study.service.schedules.fields import ScheduleFields, change_fields, read_fields
 from sprag_study.service.schedules.policies import CatchUp, DueTime, Policies, check_grace, due_times
-from sprag_study.service.schedules.times import ALIASES, Timing, wall_clock
+from sprag_study.service.schedules.times import ALIASES, Timing, TimingError, wall_clock
 from sprag_study.service.storage.schedules.runs import RunState
 from sprag_study.worker.states import StudyState
 from tests.service.schedules.conftest import NEW_YEAR
@@ -238,7 +237,7 @@ def test_the_interface_has_times_of_the_zone(service: Service, clock: Clock) -> 
     ],
 )
 def test_a_misfire_grace_is_a_duration(text: str, code: str, message: str) -> None:
-    with pytest.raises(FinishError, match=message) as caught:
+    with pytest.raises(TimingError, match=message) as caught:
         check_grace(text)
     assert caught.value.code == code
     assert Policies(misfire_grace=check_grace(" 1 day ")).grace == timedelta(days=1)

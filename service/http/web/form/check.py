@@ -26,7 +26,8 @@ from sprag_study.service.reading.quantities import TYPED
 from sprag_study.service.reading.reader import CLUTCH, Choice, Reading, reading_for
 from sprag_study.service.reading.wording import duration
 from sprag_study.service.results.draft_words import draft_words
-from sprag_study.service.schedules.deadline import ALLOWED, FinishError, finish_at
+from sprag_study.service.schedules.deadline import ALLOWED, finish_at
+from sprag_study.service.schedules.times import TimingError
 from sprag_study.service.spec.document import ParsedSpec, SpecError, load_spec, parse_spec
 from sprag_study.service.spec.measured import MeasuredDataError, parse_measured
 from sprag_study.service.views.library import Library
@@ -107,7 +108,7 @@ def look_over(
     text, finish, fault = values.get("finish_by", "").strip(), None, ""
     try:
         finish = finish_at(text, now) if text else None
-    except FinishError as error:
+    except TimingError as error:
         fault = message(Fault("/finish_by", error.code, error.message, allowed=ALLOWED))
     left = None if finish is None else (finish - now).total_seconds()
     if "/text" in values:
