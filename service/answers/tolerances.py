@@ -67,7 +67,7 @@ class ResultRibbon(TypedDict):
     highest: Annotated[list[ExtremeDrive], Doc("those with the largest one, largest first")]
 
 
-class RibbonLine(TypedDict):
+class PlacesLine(TypedDict):
     """The places of one line."""
 
     by: dict[str, float]
@@ -76,6 +76,11 @@ class RibbonLine(TypedDict):
     cases: Annotated[list[int], Doc("cases of the nominal drive")]
     failed: Annotated[list[int], Doc("drives that were run and lack a result, for each place")]
     pending: Annotated[list[int], Doc("drives that are not run yet")]
+
+
+class RibbonLine(PlacesLine):
+    """The places of one line, and the spread of each result there."""
+
     results: dict[str, ResultRibbon]
 
 
@@ -124,18 +129,12 @@ class WorstDrive(TypedDict):
     draws: Annotated[dict[str, float], Doc("its draw of each tolerance, as `change` says")]
 
 
-class YieldLine(TypedDict):
+class YieldLine(PlacesLine):
     """The yield along a line of places."""
 
-    by: dict[str, float]
-    at: dict[str, float]
-    x: list[float]
-    cases: Annotated[list[int], Doc("cases of the nominal drive")]
     each: Annotated[list[YieldShare], Doc("for each place")]
     all: Annotated[YieldShare, Doc("drives that reach the conditions at every place of the line")]
     nominal: Annotated[list[bool], Doc("whether the nominal drive reaches them")]
-    failed: list[int]
-    pending: list[int]
     causes: Annotated[CausesInfo, Doc("of reaching them at every place")]
     worst: Annotated[list[WorstDrive], Doc("the drives with the least margins")]
 

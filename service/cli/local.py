@@ -215,7 +215,7 @@ def run(
     as_json: JsonFlag = False,
 ) -> None:
     """Run a study here, without a service: rows or a report to standard output or FILE, progress on standard error."""
-    from sprag_study.service.results.unaffected import Unaffected
+    from sprag_study.service.results.unaffected import unaffecting
 
     finish, written = _finish(finish_by), table_format(form, file, as_json)
     require_csv(header, written)
@@ -239,10 +239,10 @@ def run(
     ):
         for piece in _rows(done, written, header or "names", appendix):
             write(piece)
-        record, unaffecting = done.record, Unaffected().of(done.store, done.record)
+        record, without_effect = done.record, unaffecting(done.store, done.record)
         progress = done.store.studies.progress(record.id)
         endings = progress.endings
-    say(*warning_lines(unaffecting))
+    say(*warning_lines(without_effect))
     seconds = time.monotonic() - start
     say(", ".join(_done(record, seconds, kept=db is not None)), *_rounds(progress), *ending_lines(endings))
     if as_json and to_file(file):

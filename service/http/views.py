@@ -87,7 +87,7 @@ def whole_detail(library: Library, record: StudyRecord, progress: Progress) -> S
     store, study_id = library.store, record.id
     parts = store.studies.study(study_id), store.studies.spec(study_id), store.rows.kinds(study_id)
     data = detail(record, progress, *parts, store.rows.origins(study_id))
-    unaffected = warned((*record.warnings, *library.unaffected.of(store, record)))
+    unaffected = warned((*record.warnings, *library.unaffected(record)))
     return cast("StudyDetail", {**data, **unaffected})
 
 

@@ -239,18 +239,14 @@ def calibration_csv(found: Calibration, shown: Units) -> bytes:
 
     In a reader's units; measured values of several units are in SI.
     """
-    points = [_point(found, index) for index in range(found.plan.count)]
+    points: list[dict[str, Any]] = [{**_point(found, index)} for index in range(found.plan.count)]
     ends: list[Any] = [point["interval"] or (None, None) for point in points]
     columns: dict[str, list[Any]] = {
         **{path: [point["at"][path] for point in points] for path in found.plan.paths_at},
-        "result": [point["result"] for point in points],
-        "measured": [point["measured"] for point in points],
-        "sigma": [point["sigma"] for point in points],
-        "fitted": [point["fitted"] for point in points],
+        **{name: [point[name] for point in points] for name in ("result", "measured", "sigma", "fitted")},
         "fitted.low": [low for low, _ in ends],
         "fitted.high": [high for _, high in ends],
-        "residual": [point["residual"] for point in points],
-        "leverage": [point["leverage"] for point in points],
+        **{name: [point[name] for point in points] for name in ("residual", "leverage")},
     }
     of_result = {info.name: info.unit for info in models.study_results(found.study)}
     measured = {of_result[point["result"]] for point in points}

@@ -11,7 +11,7 @@ import numpy as np
 
 from sprag_study.service.faults import refused
 from sprag_study.service.reading.catalogue import unit_of
-from sprag_study.service.results.curves import CurveQuery
+from sprag_study.service.results.curves import CurveQuery, Pairs
 from sprag_study.service.results.defaults import (
     MOST_CHOICES,
     listed_held,
@@ -63,7 +63,7 @@ class MapQuery:
     x: str
     y: str
     z: str
-    at: tuple[tuple[str, str], ...]
+    at: Pairs
 
 
 def characteristic(study: Study) -> CurveQuery | None:
@@ -90,9 +90,7 @@ def curve_query(study: Study, given: Given) -> CurveQuery | None:
     return CurveQuery(x, y, by, at, of=_family(study, given, main, by, at))
 
 
-def _family(
-    study: Study, given: Given, main: CurveQuery, by: tuple[str, ...], at: tuple[tuple[str, str], ...]
-) -> tuple[tuple[str, str], ...]:
+def _family(study: Study, given: Given, main: CurveQuery, by: tuple[str, ...], at: Pairs) -> Pairs:
     """The values that have a curve: as given, those of the main curves, some of an axis with many; () for all."""
     chosen = tuple((path, value) for path, _, value in (item.partition("=") for item in given.getlist("of") if item))
     chosen = tuple(pair for pair in chosen if any(_same_axis(study, pair[0], path) for path in by))
@@ -150,9 +148,7 @@ def map_query(study: Study, given: Given) -> MapQuery | None:
     return MapQuery(x, y, given.get("z") or main.y[0], held(study, given.getlist("at"), (x, y), one_direction=True))
 
 
-def held(
-    study: Study, given: Sequence[str], drawn: Sequence[str], *, one_direction: bool = False
-) -> tuple[tuple[str, str], ...]:
+def held(study: Study, given: Sequence[str], drawn: Sequence[str], *, one_direction: bool = False) -> Pairs:
     """Pairs of path and value for the axes that are not drawn: as given, others at their usual value.
 
     The direction of a sweep is left open unless ``one_direction``: curves show both. Of listed cases, axes that make
@@ -178,7 +174,7 @@ def held(
     return tuple(pairs.items())
 
 
-def _listed_held(study: Study, drawn: Sequence[str], given: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
+def _listed_held(study: Study, drawn: Sequence[str], given: Mapping[str, str]) -> Pairs:
     """Values of the axes of listed cases that are neither ``drawn`` (x first) nor ``given``."""
     fixed = locate_axes(study, tuple(given.items()))
     x, *by = (study.axis_of(path) for path in drawn)

@@ -18,7 +18,7 @@ from sprag_study.sentences import Sentence
 from sprag_study.service.faults import ParameterFault, SelectionError, refused
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.catalogue import unit_of
-from sprag_study.service.results.curves import Curve, CurveQuery, Curves, Fetch, Map, Selection, not_run
+from sprag_study.service.results.curves import Curve, CurveQuery, Curves, Fetch, Map, Pairs, Selection, not_run
 from sprag_study.service.results.listed_cases import cases_with, left_open, machines
 from sprag_study.service.results.refined import Line, families, plan_along, refined_curves
 from sprag_study.service.results.refined_maps import draw_refined_map, map_plan
@@ -127,7 +127,7 @@ def _with_kinds(names: list[str], regime: ResultInfo | None) -> list[str]:
 
 
 def check_map(
-    study: Study, x: str, y: str, z: str, at: Sequence[tuple[str, str]]
+    study: Study, x: str, y: str, z: str, at: Pairs
 ) -> tuple[ResultInfo, tuple[tuple[float, ...], Iterator[Line]]]:
     """The result and the rows of the map of a grid; SelectionError as of `select`."""
     (result,) = numeric_results(models.study_results(study), "z", (z,))
@@ -140,7 +140,7 @@ def check_map(
     return result, _grid_lines(study, x_axis, {y: y_axis}, fixed, 1, way_out=LEFT_OPEN)
 
 
-def draw_map(study: Study, x: str, y: str, z: str, at: Sequence[tuple[str, str]], fetch: Fetch) -> Map:
+def draw_map(study: Study, x: str, y: str, z: str, at: Pairs, fetch: Fetch) -> Map:
     """One result over two axes of a grid, or of a refined map; raises SelectionError as `select` does."""
     plan = map_plan(study)
     if plan is not None:

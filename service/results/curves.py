@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 #: Results of cases, aligned with them: (case numbers, result names) -> columns.
 Fetch = Callable[[Ints, Sequence[str]], "CaseColumns"]
 
+#: Paths with values as text, with or without a unit.
+Pairs = tuple[tuple[str, str], ...]
+
 
 @dataclass(frozen=True, slots=True)
 class CurveQuery:
@@ -41,9 +44,9 @@ class CurveQuery:
     x: str
     y: tuple[str, ...]
     by: tuple[str, ...] = ()
-    at: tuple[tuple[str, str], ...] = ()
+    at: Pairs = ()
     number: int = 0
-    of: tuple[tuple[str, str], ...] = ()
+    of: Pairs = ()
 
 
 @dataclass(frozen=True, slots=True)

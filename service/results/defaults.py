@@ -14,7 +14,7 @@ from sprag_study.service.faults import refused
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.catalogue import unit_of
 from sprag_study.service.reading.reader import Phrase, joined, plural
-from sprag_study.service.results.curves import CurveQuery
+from sprag_study.service.results.curves import CurveQuery, Pairs
 from sprag_study.service.results.listed_cases import (
     MOST_CURVES,
     cases_with,
@@ -100,7 +100,7 @@ def _nominal(study: Study) -> dict[int, list[float]]:
     return {} if drives is None else {drives: [float(study.axes[drives].array.min())]}
 
 
-def _listed_rest(study: Study, x: int, cases: NDArray[np.int64]) -> tuple[tuple[str, ...], tuple[tuple[str, str], ...]]:
+def _listed_rest(study: Study, x: int, cases: NDArray[np.int64]) -> tuple[tuple[str, ...], Pairs]:
     """What distinguishes the curves of listed cases along axis ``x``, and what is held.
 
     All other axes distinguish the curves where these are few; otherwise one does, and the others are held.
@@ -116,16 +116,14 @@ def _listed_rest(study: Study, x: int, cases: NDArray[np.int64]) -> tuple[tuple[
     return (by,), _pairs(study, held)
 
 
-def listed_held(
-    study: Study, x: int, by: Collection[int], fixed: Mapping[int, Sequence[float]]
-) -> tuple[tuple[str, str], ...]:
+def listed_held(study: Study, x: int, by: Collection[int], fixed: Mapping[int, Sequence[float]]) -> Pairs:
     """Values of the axes of listed cases that are neither drawn nor ``fixed`` (SI), held where these are many."""
     cases = cases_with(study, {**_nominal(study), **fixed})
     left, few = left_open(study, x, by, cases)
     return () if few else _pairs(study, usual_machine(study, left, cases))
 
 
-def _pairs(study: Study, held: Mapping[int, float]) -> tuple[tuple[str, str], ...]:
+def _pairs(study: Study, held: Mapping[int, float]) -> Pairs:
     return tuple((study.axes[position].paths[0], repr(value)) for position, value in held.items())
 
 
@@ -136,9 +134,7 @@ def no_curves(study: Study) -> str:
     return N_("No two cases of this study differ in one parameter only, so there is no curve.")
 
 
-def many_values(
-    study: Study, path: str, most: int = _CHOSEN_CURVES, at: Sequence[tuple[str, str]] = ()
-) -> tuple[tuple[str, str], ...]:
+def many_values(study: Study, path: str, most: int = _CHOSEN_CURVES, at: Pairs = ()) -> Pairs:
     """At most ``most`` values of an axis with many of them, for a family of curves: pairs as those of `CurveQuery.of`.
 
     Its first, its last, that at which it is held otherwise, and others evenly between; () for an axis with few values,
@@ -164,8 +160,8 @@ def completed(
     x: str | None,
     y: tuple[str, ...],
     by: tuple[str, ...],
-    at: tuple[tuple[str, str], ...],
-    of: tuple[tuple[str, str], ...] = (),
+    at: Pairs,
+    of: Pairs = (),
 ) -> CurveQuery:
     """The curves of these choices; without ``x`` or ``y`` as they are drawn first.
 

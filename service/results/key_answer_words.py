@@ -173,14 +173,9 @@ def _shown(item: Found, x_unit: str, reading: Reading) -> dict[str, Any]:
         "result": fields["result"],
         "unit": reading.unit(item.unit),
         "value": reading.value(item.value, item.unit),
-        "x": reading.value(fields["x"], x_unit),
-        "low": reading.value(fields["low"], x_unit),
-        "high": reading.value(fields["high"], x_unit),
+        **{name: reading.value(getattr(item, name), x_unit) for name in ("x", "low", "high")},
         **({} if reading.unit(x_unit) == x_unit else {"unit of x": reading.unit(x_unit)}),
-        "above": fields["above"],
-        "edge": fields["edge"],
-        "interpolated": fields["interpolated"],
-        "regime": fields["regime"],
+        **{name: getattr(item, name) for name in ("above", "edge", "interpolated", "regime")},
         "note": note_of(fields, x_unit).said(reading),
     }
 

@@ -31,10 +31,9 @@ from sprag_study.worker.models.presentation import Answer
 from sprag_study.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from sprag_study.service.results.curves import CurveQuery, Curves, Fetch
     from sprag_study.service.storage.studies.records import CaseColumns
+    from sprag_study.worker.arrays import Floats, Ints
     from sprag_study.worker.models import ResultInfo
     from sprag_study.worker.study import Study
 
@@ -222,6 +221,12 @@ def answers_at(study: Study, query: CurveQuery, curve: Curve, x: float | None) -
     return CurveAnswers(curve.line, answers, here)
 
 
+def same_places(x: Floats, point: float) -> Ints:
+    """Where the values of an axis are a point, apart from rounding."""
+    scale = max(float(np.abs(x).max(initial=0.0)), abs(point))
+    return np.flatnonzero(np.abs(x - point) <= SAME_VALUE * scale)
+
+
 def _here(name: str) -> Answer:
     """The answer that a result is at the working point."""
     return Answer(name, name, name, "here")
@@ -299,12 +304,12 @@ def _of_case(answer: Answer, info: ResultInfo, columns: CaseColumns, place: int,
     )  # fmt: skip
 
 
-def _why(values: NDArray[np.float64], endings: Sequence[str | None]) -> Why:
+def _why(values: Floats, endings: Sequence[str | None]) -> Why:
     """Why none of these results counts: a case that did not end ok has none, whatever could still be computed."""
     return "unsettled" if np.isfinite(values[np.array(endings) == models.OK]).any() else "no-result"
 
 
-def _best(values: NDArray[np.float64], answer: Answer) -> int:
+def _best(values: Floats, answer: Answer) -> int:
     return int(np.argmax(values) if answer.kind == "largest" else np.argmin(values))
 
 
@@ -400,10 +405,9 @@ class _Reader:
         if point is None or not self._x.size:
             return replace(nothing, why="no-case")
         run, values = self._curve.run(), self._curve.known(info.name)
-        scale = max(float(np.max(np.abs(self._x))), abs(point))
-        exact = [place for place in run.tolist() if abs(self._x[place] - point) <= SAME_VALUE * scale]
-        if exact:
-            place = exact[0]
+        exact = run[same_places(self._x[run], point)]
+        if exact.size:
+            place = int(exact[0])
             if not np.isfinite(values[place]):
                 kinds = self._curve.regimes
                 return replace(

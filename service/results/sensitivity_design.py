@@ -67,15 +67,10 @@ def going_together(columns: Floats) -> tuple[int, int] | None:
     """Two axes whose orders determine each other, such as those of a zip; None when there are none."""
     if len(columns) < 2 or columns.shape[1] < 2:
         return None
-    ranks = _ranks(columns)
-    spread = ranks.std(axis=0)
-    for first in range(columns.shape[1]):
-        for second in range(first + 1, columns.shape[1]):
-            if spread[first] > 0.0 and spread[second] > 0.0:
-                shared = float((ranks[:, first] * ranks[:, second]).mean() / (spread[first] * spread[second]))
-                if abs(shared) >= _TOGETHER:
-                    return first, second
-    return None
+    with np.errstate(invalid="ignore", divide="ignore"):  # an axis of one value
+        shared = np.abs(np.corrcoef(_ranks(columns), rowvar=False))
+    pairs = np.argwhere(np.triu(shared, 1) >= _TOGETHER).tolist()
+    return (pairs[0][0], pairs[0][1]) if pairs else None
 
 
 def why_no_shares(columns: Floats, known: Bools, names: list[str]) -> str:
@@ -109,9 +104,6 @@ def why_no_shares(columns: Floats, known: Bools, names: list[str]) -> str:
 
 def _ranks(columns: Floats) -> Floats:
     """Ranks of each column from -1 to 1, equal for equal values, shape (cases, axes)."""
-    found = np.empty(columns.shape)
-    for at, column in enumerate(columns.T):
-        _, group, count = np.unique(column, return_inverse=True, return_counts=True)
-        middle = np.cumsum(count) - (count + 1) / 2.0
-        found[:, at] = 2.0 * middle[group.reshape(-1)] / max(len(column) - 1, 1) - 1.0
-    return found
+    from scipy.stats import rankdata
+
+    return np.asarray(2.0 * (rankdata(columns, axis=0) - 1.0) / max(len(columns) - 1, 1) - 1.0)

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from operator import attrgetter
-from threading import Lock
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from cachetools import LRUCache, cachedmethod
 
 from sprag_study.sentences import Place, Sentence, WarningText
 from sprag_study.service.results.curves import Fetch
@@ -30,7 +27,6 @@ MOST_ROWS: Final = 200_000
 _SAME: Final = 1e-9
 #: First parts of the names of results that describe the computation rather than the machine.
 _CHECKS: Final = ("balance", "run", "reset")
-_KEPT: Final = 256
 
 
 def unaffected(study: Study, fetch: Fetch) -> tuple[str, ...]:
@@ -111,21 +107,8 @@ def _changes(groups: Sequence[Ints], names: Sequence[str], fetch: Fetch) -> bool
     return False
 
 
-class Unaffected:
-    """`unaffected` of ended studies, kept in memory: their rows do not change."""
-
-    def __init__(self) -> None:
-        self._found: LRUCache[tuple[str, int], tuple[str, ...]] = LRUCache(_KEPT)
-        self._lock = Lock()
-
-    def of(self, store: Store, record: StudyRecord) -> tuple[str, ...]:
-        """The sentences about a study; none before its end."""
-        if not record.state.terminal or not record.done:
-            return ()
-        return self._of(store, record)
-
-    @cachedmethod(
-        attrgetter("_found"), key=lambda _self, _store, record: (record.id, record.revision), lock=attrgetter("_lock")
-    )
-    def _of(self, store: Store, record: StudyRecord) -> tuple[str, ...]:
-        return unaffected(store.studies.study(record.id), partial(store.rows.for_cases, record.id))
+def unaffecting(store: Store, record: StudyRecord) -> tuple[str, ...]:
+    """The sentences about the axes of a stored study; none before its end."""
+    if not record.state.terminal or not record.done:
+        return ()
+    return unaffected(store.studies.study(record.id), partial(store.rows.for_cases, record.id))

@@ -75,9 +75,14 @@ def initial_values(study: Study) -> dict[str, Parameter]:
     return found
 
 
+def _ranges(study: Study) -> dict[str, list[float]]:
+    """Those of the study's starts, by path."""
+    return study.run[STARTS]["ranges"] if has_starts(study.run) else {}
+
+
 def usual_ends(study: Study) -> dict[str, tuple[str, str]]:
     """The ends of the ranges of the study's starts with their units, by path."""
-    ranges = study.run[STARTS]["ranges"] if has_starts(study.run) else {}
+    ranges = _ranges(study)
     known = initial_values(study)
     return {
         path: (quantity_text(low, known[path].unit), quantity_text(high, known[path].unit))
@@ -96,7 +101,7 @@ def basin_paths(study: Study, x: str | None, y: str | None) -> tuple[str, str]:
     if not has_basin(study):
         raise FaultError("not-found", "Only cases that run until their motion is settled have basins.")
     known = initial_values(study)
-    ranges = study.run[STARTS]["ranges"] if has_starts(study.run) else {}
+    ranges = _ranges(study)
     usual = [path for path in (*ranges, *known) if path in known]
     paths: list[str] = []
     for name, given in (("x", x), ("y", y)):
@@ -116,7 +121,7 @@ def basin_query(study: Study, case: int, x: str | None, y: str | None, ends: End
     """
     paths = basin_paths(study, x, y)
     known = initial_values(study)
-    ranges = study.run[STARTS]["ranges"] if has_starts(study.run) else {}
+    ranges = _ranges(study)
     both = [_ends(name, known[path], ranges.get(path), ends[name]) for name, path in zip("xy", paths, strict=True)]
     corners = [dict(zip(paths, corner, strict=True)) for corner in itertools.product(*both)]
     refuse_impossible({paths[0]: "x", paths[1]: "y"}, case_machine(study, case), corners)

@@ -16,7 +16,7 @@ from sprag_study.service.figures.read import read_map
 from sprag_study.service.json_text import numbers
 from sprag_study.service.results.choice import held
 from sprag_study.service.results.curve_cases import check_map, select
-from sprag_study.service.results.curves import CurveQuery, Curves, Map, flag_names
+from sprag_study.service.results.curves import CurveQuery, Curves, Map, Pairs, flag_names
 from sprag_study.service.results.defaults import completed, drawn_numbers
 from sprag_study.service.results.refined import not_joined
 from sprag_study.service.results.regimes import kind_columns
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from sprag_study.worker.study import Study
 
 
-def pairs(texts: Sequence[str] | None, parameter: str = "at") -> tuple[tuple[str, str], ...]:
+def pairs(texts: Sequence[str] | None, parameter: str = "at") -> Pairs:
     """Paths and values of a setting such as ``at``; raises a fault for a text without a path or a value."""
     found = []
     for item in texts or ():

@@ -65,15 +65,18 @@ class _OfDrives:
         """Whether drives were drawn."""
         return study.batched
 
+    def small(self, study: Study, chosen: object) -> bool:
+        """By the cases of the study."""
+        return study.cases <= study_view.FEW // 10
+
     def offered(self, study: Study) -> dict[str, Offered]:
         """The axes, the results, and what a good drive reaches first."""
-        infos = models.study_results(study)
         axes = {"": [(axis.paths[0], axis_name(study, axis.paths[0])) for axis in varying_axes(study)]}
         main, y = main_query(study), judged_by(study, drawn_results(study))
         return {
             "x": Offered((main.x,) if main else (), groups=axes, left_out=main is None),
             "by": Offered(groups=axes, left_out=len(axes[""]) < 2),
-            "y": Offered((y,), groups=named(numeric_names(infos))),
+            "y": Offered((y,), groups=named(numeric_names(models.study_results(study)))),
             "quantile": Offered(tuple(f"{100.0 * p:g} %" for p in QUANTILES)),
             "condition": Offered((first_condition(study, y),)),
         }
@@ -100,13 +103,8 @@ class RibbonView(_OfDrives, StudyView[RibbonQuestion, RibbonQuery, Ribbon]):
 
     def check(self, study: Study, chosen: RibbonQuery) -> None:
         """The results and the axes."""
-        infos = models.study_results(study)
-        numeric_results(infos, "y", chosen.y)
+        numeric_results(models.study_results(study), "y", chosen.y)
         places_of(study, chosen.asked)
-
-    def small(self, study: Study, chosen: RibbonQuery) -> bool:
-        """By the cases of the study."""
-        return study.cases <= study_view.FEW // 10
 
     def find(self, library: Library, study_id: str, chosen: RibbonQuery, *, drawn: bool = False) -> Ribbon:
         """The ribbons; SelectionError as of `ribbon`."""
@@ -146,13 +144,8 @@ class YieldView(_OfDrives, StudyView[YieldQuestion, YieldQuery, Yield]):
 
     def check(self, study: Study, chosen: YieldQuery) -> None:
         """The conditions and the axes."""
-        infos = models.study_results(study)
-        read_conditions(infos, chosen.conditions)
+        read_conditions(models.study_results(study), chosen.conditions)
         places_of(study, chosen.asked)
-
-    def small(self, study: Study, chosen: YieldQuery) -> bool:
-        """By the cases of the study."""
-        return study.cases <= study_view.FEW // 10
 
     def find(self, library: Library, study_id: str, chosen: YieldQuery, *, drawn: bool = False) -> Yield:
         """The yields; SelectionError as of `yields`."""

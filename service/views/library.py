@@ -9,7 +9,7 @@ from cachetools import LRUCache
 
 from sprag_study.service.reading.quantities import TYPED, read_units
 from sprag_study.service.reading.reader import Choice, Reading, reading_for
-from sprag_study.service.results.unaffected import Unaffected
+from sprag_study.service.results.unaffected import unaffecting
 from sprag_study.service.storage.store import Store
 from sprag_study.service.views.columns import Columns
 from sprag_study.service.views.kept import Calibrations, Fronts, Kept
@@ -21,11 +21,14 @@ if TYPE_CHECKING:
     from sprag_study.service.reading.reader import Phrase
     from sprag_study.service.results.headlines.headline import Headline
     from sprag_study.service.results.key_answers import StudyAnswers
+    from sprag_study.service.storage.studies.records import StudyRecord
     from sprag_study.worker.chunking import Chunking
 
 #: Headlines that are kept: of questions, and of listed studies.
 _TOLD: Final = 512
 _LISTED: Final = 2000
+#: Ended studies of which it is kept which axes change nothing.
+_UNAFFECTED: Final = 256
 #: Answers that are kept with their curves, for what one page shows of them.
 _ANSWERS: Final = 8
 
@@ -53,9 +56,13 @@ class Library:
         self.told: Kept[tuple[object, ...], Headline] = Kept(LRUCache(_TOLD))
         #: Answers of curves by study, its revision, and the question.
         self.answers: Kept[tuple[object, ...], StudyAnswers] = Kept(LRUCache(_ANSWERS))
-        self.unaffected = Unaffected()
+        self._unaffected: Kept[tuple[str, int], tuple[str, ...]] = Kept(LRUCache(_UNAFFECTED))
         #: Of listed studies the revision, and headline and description where they have them (`views.listed`).
         self.headlines: Kept[str, tuple[int, tuple[Headline, Phrase] | None]] = Kept(LRUCache(_LISTED))
+
+    def unaffected(self, record: StudyRecord) -> tuple[str, ...]:
+        """The sentences about axes of a study that change no result; none before its end."""
+        return self._unaffected.of((record.id, record.revision), lambda: unaffecting(self.store, record))
 
     def __reduce__(self) -> tuple[Callable[[str, Chunking], Library], tuple[str, Chunking]]:
         return _library, (

@@ -75,7 +75,7 @@ class SensitivityView(StudyView[SensitivityQuestion, tuple[str, ...], list[Sensi
     def json(self, answer: SensitivityAnswer) -> Mapping[str, Any]:
         """The sensitivities as JSON data, with warnings of parameters without effect."""
         record = answer.library.store.studies.get(answer.study_id)
-        warnings = warned(answer.library.unaffected.of(answer.library.store, record))
+        warnings = warned(answer.library.unaffected(record))
         return {"study": answer.study_id, "results": [item.to_json() for item in answer.result], **warnings}
 
     def shown(self, answer: SensitivityAnswer) -> Shown:

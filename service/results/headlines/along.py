@@ -22,7 +22,7 @@ from sprag_study.service.results.headlines.headline import (
     trace_of,
 )
 from sprag_study.service.results.key_answer_words import answer_facts, curve_name, curve_named, note_of, place_text
-from sprag_study.service.results.key_answers import OF_PLACES, answers_at, usual_curve
+from sprag_study.service.results.key_answers import OF_PLACES, answers_at, same_places, usual_curve
 from sprag_study.service.results.selection import axis_name
 from sprag_study.worker import models
 from sprag_study.worker.directions import SWEEP, direction
@@ -126,7 +126,7 @@ def place_on(curve: Curve, name: str, x: float | None, *, asked: bool) -> tuple[
         return None
     values = np.asarray(curve.line.x)[run]
     scale = max(float(np.abs(values).max()), abs(x))
-    exact = np.flatnonzero(np.abs(values - x) <= SAME_VALUE * scale)
+    exact = same_places(values, x)
     if exact.size:
         return x, (int(run[exact[0]]),)
     below, above = np.flatnonzero(values < x), np.flatnonzero(values > x)

@@ -22,14 +22,13 @@ from sprag_study.service.results.headlines.headline import (
     digits,
     trace_of,
 )
-from sprag_study.service.results.key_answers import OF_PLACES, from_base, place_of
+from sprag_study.service.results.key_answers import OF_PLACES, from_base, place_of, same_places
 from sprag_study.service.results.tolerances.batch import Asked
 from sprag_study.service.results.tolerances.conditions import first_condition
 from sprag_study.service.results.tolerances.ribbons import QUANTILES, ribbon
 from sprag_study.service.results.tolerances.yields import yields
 from sprag_study.worker import models
 from sprag_study.worker.spread import DRIVE
-from sprag_study.worker.study import SAME_VALUE
 
 if TYPE_CHECKING:
     from sprag_study.service.results.curves import CurveQuery, Fetch
@@ -89,7 +88,7 @@ def _place(path: str, line: RibbonLine, x: float, *, asked: bool) -> tuple[int, 
     """The place nearest to ``x``, and the neighbours where that was ``asked`` for and is none of them."""
     values = np.asarray(line.line.x)
     place = int(np.argmin(np.abs(values - x)))
-    if not asked or abs(values[place] - x) <= SAME_VALUE * max(float(np.abs(values).max()), abs(x)):
+    if not asked or same_places(values, x).size:
         return place, None
     below, above = values[values < x], values[values > x]
     return place, Gap(path, x, float(below.max()), float(above.min())) if below.size and above.size else None

@@ -12,7 +12,7 @@ from sprag_study.sentences import plural
 from sprag_study.service.faults import refused
 from sprag_study.service.reading.catalogue import unit_of
 from sprag_study.service.results.curve_cases import select
-from sprag_study.service.results.curves import CurveQuery, Fetch, not_run
+from sprag_study.service.results.curves import CurveQuery, Fetch, Pairs, not_run
 from sprag_study.service.results.defaults import main_query
 from sprag_study.service.results.refined import Line
 from sprag_study.service.results.regimes import kind_columns
@@ -38,7 +38,7 @@ class Asked:
 
     x: str | None = None
     by: tuple[str, ...] = ()
-    at: tuple[tuple[str, str], ...] = ()
+    at: Pairs = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +129,7 @@ def _completed(study: Study, asked: Asked) -> Asked:
     return Asked(roles[0], (*asked.by, *roles[1:]), (*asked.at, *held))
 
 
-def _single(study: Study, at: Sequence[tuple[str, str]]) -> Line:
+def _single(study: Study, at: Pairs) -> Line:
     """The one place at these values."""
     fixed = locate_axes(study, at)
     values = {path: study.axes[axis].value(index) for axis, (path, index) in fixed.items()}

@@ -53,11 +53,8 @@ def quantiles(results: Floats, probabilities: tuple[float, ...]) -> Quantiles:
     values, low, high = (np.full(shape, np.nan) for _ in range(3))
     for count in np.unique(drives[drives > 0]).tolist():
         rows = np.flatnonzero(drives == count)
+        values[:, rows] = np.quantile(ordered[rows, :count], probabilities, axis=1, method="median_unbiased")
         for index, probability in enumerate(probabilities):
-            place = min(max((count + 1.0 / 3.0) * probability + 1.0 / 3.0, 1.0), float(count)) - 1.0
-            below = int(place)
-            above, part = min(below + 1, count - 1), place - below
-            values[index, rows] = (1.0 - part) * ordered[rows, below] + part * ordered[rows, above]
             first, last = ranks(count, probability)
             if first >= 1:
                 low[index, rows] = ordered[rows, first - 1]

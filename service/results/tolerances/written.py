@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from sprag_study.service import exports
 from sprag_study.service.answers import filled
 from sprag_study.service.answers.results import ResultMeaning
+from sprag_study.service.answers.tolerances import ExtremeDrive
 from sprag_study.service.json_text import numbers
 from sprag_study.service.reading.catalogue import unit_of
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
         CausesInfo,
         ConditionInfo,
         PlacesAxis,
+        PlacesLine,
         ResultRibbon,
         RibbonReport,
         ToleranceInfo,
@@ -46,6 +48,19 @@ def _axis(places: Places) -> PlacesAxis | None:
     return None if places.x is None else {"path": places.x, "unit": places.units[places.x]}
 
 
+def _line(one: RibbonLine | YieldLine) -> PlacesLine:
+    """Which places, and the drives without results there."""
+    line = one.line
+    return {
+        "by": line.by,
+        "at": line.at,
+        "x": list(line.x),
+        "cases": line.cases.tolist(),
+        "failed": one.failed.tolist(),
+        "pending": one.pending.tolist(),
+    }
+
+
 def ribbon_json(study_id: str, found: Ribbon) -> RibbonReport:
     """The answer with the ribbons of a study."""
     places = found.places
@@ -59,12 +74,7 @@ def ribbon_json(study_id: str, found: Ribbon) -> RibbonReport:
         "results": {info.name: filled(ResultMeaning, info) for info in found.results},
         "lines": [
             {
-                "by": one.line.by,
-                "at": one.line.at,
-                "x": list(one.line.x),
-                "cases": one.line.cases.tolist(),
-                "failed": one.failed.tolist(),
-                "pending": one.pending.tolist(),
+                **_line(one),
                 "results": {name: _result(places.study, spread) for name, spread in one.spreads.items()},
             }
             for one in found.lines
@@ -81,8 +91,8 @@ def _result(study: Study, spread: ResultSpread) -> ResultRibbon:
         "low": [numbers(row) for row in parts.low],
         "high": [numbers(row) for row in parts.high],
         "causes": causes_json(study, spread.causes),
-        "lowest": [{"drive": one.drive, "value": one.value, "case": one.case} for one in spread.lowest],
-        "highest": [{"drive": one.drive, "value": one.value, "case": one.case} for one in spread.highest],
+        "lowest": [filled(ExtremeDrive, one) for one in spread.lowest],
+        "highest": [filled(ExtremeDrive, one) for one in spread.highest],
     }
 
 
@@ -150,15 +160,10 @@ def yield_json(study_id: str, found: Yield) -> YieldReport:
         "units": places.units,
         "lines": [
             {
-                "by": one.line.by,
-                "at": one.line.at,
-                "x": list(one.line.x),
-                "cases": one.line.cases.tolist(),
+                **_line(one),
                 "each": [_share(one.each, place) for place in range(one.line.cases.size)],
                 "all": _share(one.whole, ()),
                 "nominal": one.nominal.tolist(),
-                "failed": one.failed.tolist(),
-                "pending": one.pending.tolist(),
                 "causes": causes_json(places.study, one.causes),
                 "worst": [_worst(one, worst) for worst in one.worst],
             }
