@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Final, NamedTuple
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from sprag_study.sentences import Place
 from sprag_study.service.exports.inputs import Input
@@ -19,11 +21,10 @@ from sprag_study.service.languages import N_, _, gettext
 from sprag_study.service.reading.catalogue import axes_json
 from sprag_study.service.reading.directions import ends_in_words
 from sprag_study.service.reading.part_names import lower_first, upper_first
-from sprag_study.service.reading.reader import CODES, shown, term, titled
+from sprag_study.service.reading.reader import CODES, model_title, shown, term, titled
 from sprag_study.service.reading.wording import number, unit_text, words
 from sprag_study.service.report.blocks import Block, Image, Section, Table, Text
 from sprag_study.service.report.drawn import chosen_image, drawing_images, image, map_images
-from sprag_study.service.report.facts import facts_of
 from sprag_study.service.results.defaults import caption, varying_axes
 from sprag_study.service.results.fronts import goal_units
 from sprag_study.service.results.key_answer_words import answer_facts, curve_name, note_of, said_title
@@ -40,6 +41,42 @@ if TYPE_CHECKING:
     from sprag_study.service.report.content import Report
     from sprag_study.service.report.office import Office
     from sprag_study.service.results.key_answers import Found
+    from sprag_study.service.storage.studies.records import StudyRecord
+    from sprag_study.worker.study import Study
+
+
+def facts_of(record: StudyRecord, study: Study, spec: Mapping[str, Any], office: Office) -> tuple[tuple[str, str], ...]:
+    """Names and values of a study; ``spec`` is the user's own."""
+    ended = record.finished_at
+    counts = {"cases": number(record.cases), "done": number(record.done), "ok": number(record.ok)}
+    return (
+        (_("study"), record.id),
+        (_("model"), model_title(record.model)),
+        (_("state"), f"{_(record.state.value)}: {_(record.state.sentence)}"),
+        (_("cases"), _("{cases}, of which {done} are done and {ok} ended ok", **counts)),
+        (_("axes"), _combined(study)),
+        (_("submitted"), office.moment(record.created_at)),
+        (_("ended"), _("not yet") if ended is None else office.moment(ended)),
+        (_("version of Sprag"), version("sprag-study")),
+        (_("engine"), record.engine_version),
+        (_("hash of the physics"), record.physics_hash),
+        (_("SHA-256 of the spec"), spec_hash(spec)),
+    )
+
+
+def spec_hash(spec: Mapping[str, Any]) -> str:
+    """SHA-256 of a spec as JSON in ASCII with sorted keys and without spaces."""
+    text = json.dumps(spec, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode("ascii")).hexdigest()
+
+
+def _combined(study: Study) -> str:
+    if study.plan is not None:
+        return _("cases chosen in rounds")
+    if not study.axes:
+        return _("none")
+    return _("every combination") if study.combine == "grid" else _("side by side")
+
 
 #: Digits of inputs.
 _DIGITS: Final = 8

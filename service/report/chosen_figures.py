@@ -13,10 +13,9 @@ from sprag_study.service.languages import _
 from sprag_study.service.reading.part_names import lower_first
 from sprag_study.service.reading.reader import Choice, reading_for
 from sprag_study.service.results.choice import Address, MapQuery, curve_query, map_query
-from sprag_study.service.results.curve_cases import select
+from sprag_study.service.results.curve_cases import drawn_curves, select, stored_map
 from sprag_study.service.results.curves import CurveQuery, Map
 from sprag_study.service.results.defaults import caption, drawn_numbers
-from sprag_study.service.results.stored_curves import drawn_curves, stored_map
 
 if TYPE_CHECKING:
     from sprag_study.service.figures.figure import Figure

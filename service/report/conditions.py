@@ -9,7 +9,7 @@ from sprag_study.service.languages import _
 from sprag_study.service.reading.catalogue import axes_json
 from sprag_study.service.reading.reader import Phrase, joined, plural
 from sprag_study.service.report.blocks import Section, Table, Text
-from sprag_study.service.results.asked import goals_of, limits_of
+from sprag_study.service.results.fronts import goals_of, limits_of
 from sprag_study.service.results.selection import with_tolerance
 from sprag_study.service.results.varied import ends, formula_text, varied, with_distribution
 

@@ -20,9 +20,8 @@ from sprag_study.service.reading.catalogue import unit_of
 from sprag_study.service.reading.directions import case_values
 from sprag_study.service.reading.quantities import TYPED
 from sprag_study.service.reading.reader import Choice, Reading, model_title, reading_for
-from sprag_study.service.report.calibration import calibration_part
 from sprag_study.service.report.chosen_figures import ChosenFigure, chosen_figures
-from sprag_study.service.report.drives import DrivesPart, drives_part
+from sprag_study.service.report.drives import DrivesPart, calibration_part, drives_part
 from sprag_study.service.results.curve_cases import draw, draw_map, select
 from sprag_study.service.results.curves import Curves, Map
 from sprag_study.service.results.defaults import drawn_results, main_query, no_curves, varying_axes

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Final
 
@@ -9,7 +10,7 @@ from sprag_study.service.faults import choice_of, refused
 from sprag_study.service.languages import _, pgettext
 from sprag_study.service.reading.limits import characters
 from sprag_study.service.report.blocks import Block, Document, Section, Text, said
-from sprag_study.service.report.chapters import appendix, further_figures
+from sprag_study.service.report.chapters import appendix, chapters_of, further_figures
 from sprag_study.service.report.content import AS_TYPED, Report
 from sprag_study.service.report.office import Office
 from sprag_study.service.report.sheets import sheets
@@ -20,7 +21,10 @@ if TYPE_CHECKING:
     from datetime import datetime
 
     from sprag_study.service.reading.reader import Choice
+    from sprag_study.service.report.blocks import Document
+    from sprag_study.service.report.office import Office
     from sprag_study.service.views.library import Library
+    from sprag_study.service.views.study_questions import ReportQuestion
 
 #: Most characters of a text of the author.
 LONGEST_TEXT: Final = 2_000
@@ -103,3 +107,17 @@ def _without(section: Section, *, edited: bool) -> Section:
         return edited or not (isinstance(block, Text) and block.look == "own" and not block.text)
 
     return Section(section.title, tuple(filter(wanted, section.blocks)), section.sheet)
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """A document, and the chapters that it can have with their titles."""
+
+    document: Document
+    chapters: dict[str, str]
+
+
+def shown_document(library: Library, study_id: str, choice: Choice, question: ReportQuestion, office: Office) -> Shown:
+    """The document of a stored study with a place for each text of its author; raises as `document_of` does."""
+    report = report_of(library, study_id, choice, question)
+    return Shown(made_document(report, office, edited=True), chapters_of(report))

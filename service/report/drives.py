@@ -1,24 +1,30 @@
-"""The part of a report about the drives of a study with tolerances: ribbon, yield, causes, worst drives."""
+"""The parts of a report about a batch of drives and about a calibration: a figure, and what should be known."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from sprag_study.sentences import Amount, Name
 from sprag_study.service.faults import SelectionError
+from sprag_study.service.figures.calibration import calibration_figure
 from sprag_study.service.figures.ribbons import ribbon_figure
 from sprag_study.service.languages import _
+from sprag_study.service.reading.catalogue import unit_of
 from sprag_study.service.reading.reader import Phrase, joined, plural
 from sprag_study.service.results.defaults import drawn_results
 from sprag_study.service.results.headlines.along import judged_by
 from sprag_study.service.results.tolerances.batch import Asked
 from sprag_study.service.results.tolerances.conditions import first_condition
 from sprag_study.service.results.tolerances.ribbons import QUANTILES, ribbon
-from sprag_study.service.results.tolerances.told import at_line, causes_sentences, worst_sentences, yield_sentence
+from sprag_study.service.results.tolerances.written import at_line, causes_sentences, worst_sentences, yield_sentence
 from sprag_study.service.results.tolerances.yields import yields
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from sprag_study.service.figures.figure import Figure
+    from sprag_study.service.results.calibration import Calibration
     from sprag_study.service.results.curves import Fetch
     from sprag_study.worker.study import Study
 
@@ -53,3 +59,24 @@ def drives_part(study: Study, fetch: Fetch) -> DrivesPart | None:
         parts += [text for name in names for text in causes_sentences(study, one.spreads[name].causes, name)]
         sentences += [joined(": ", (at, text)) if at else text for text in parts]
     return DrivesPart(ribbon_figure(drawn), _("Quantiles over the drives"), tuple(sentences))
+
+
+def calibration_part(found: Calibration) -> DrivesPart:
+    """The part about the calibration."""
+    if found.answer is None:
+        return DrivesPart(None, "", (Phrase("The first fit has not ended yet."),))
+    caption = _("Measured points on the fitted curve, and residuals")
+    return DrivesPart(calibration_figure(found), caption, (*_values(found), *found.sentences))
+
+
+def _values(found: Calibration) -> Iterator[str]:
+    known = found.answer
+    assert known is not None
+    for index, name in enumerate(found.names):
+        unit = unit_of(found.study, name)
+        value = Phrase("{name} = {value}", name=Name(name), value=Amount(known.values[index], unit, 6))
+        if known.intervals is None:
+            yield joined("", (value, "."))
+            continue
+        low, high = (Amount(end, unit, 6, bare=True) for end in known.intervals[index])
+        yield Phrase("{value} (95 % interval {low} to {high}).", value=value, low=low, high=high)

@@ -9,6 +9,8 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
@@ -44,6 +46,8 @@ from sprag_study.worker.limits import MAX_CURVE_VALUES
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from sprag_study.service.results.curves import Curve, CurveQuery, Curves, Map
+    from sprag_study.service.storage.store import Store
     from sprag_study.worker.models import ResultInfo
     from sprag_study.worker.planning.refine import Curve as Refined
     from sprag_study.worker.study import Study
@@ -294,3 +298,35 @@ def _with_open(study: Study, x_axis: int, by: dict[str, int], cases: NDArray[np.
             faults.append(ParameterFault("at", "not-fixed", message, None, listed(values), unit_of(study, path)))
         raise SelectionError(faults)
     return by | {study.axes[position].paths[0]: position for position in left}
+
+
+#: Further motions of each case that a picture marks.
+_MOST_FURTHER: Final = 4
+
+
+def stored_curves(store: Store, study_id: str, query: CurveQuery) -> Curves:
+    """The curves of a study; raises StudyNotFoundError, and SelectionError as `select` does."""
+    study = store.studies.study(study_id)
+    selection = select(study, query)
+    return draw(selection, partial(store.rows.for_cases, study_id, number=query.number))
+
+
+def drawn_curves(store: Store, study_id: str, query: CurveQuery) -> Curves:
+    """The same for a picture: with the other motions of cases that have several, where the most frequent are drawn."""
+    curves, study = stored_curves(store, study_id, query), store.studies.study(study_id)
+    further: list[Curve] = []
+    if query.number == 0 and models.numbered_by(study.model, models.variant_of(study)) is not None:
+        for number in range(1, _MOST_FURTHER + 1):
+            found = stored_curves(store, study_id, replace(query, number=number)).curves
+            known = [curve for curve in found if any(np.isfinite(y).any() for y in curve.y.values())]
+            if not known:
+                break
+            further += known
+    return replace(curves, further=tuple(further))
+
+
+def stored_map(store: Store, study_id: str, query: CurveQuery) -> Map:
+    """The map of the one result of ``query`` over its x and its one axis of by; raises as `stored_curves` does."""
+    study = store.studies.study(study_id)
+    fetch = partial(store.rows.for_cases, study_id, number=query.number)
+    return draw_map(study, query.x, query.by[0], query.y[0], query.at, fetch)

@@ -14,8 +14,8 @@ from sprag_study.service.reading.catalogue import shown_values, unit_of
 from sprag_study.service.reading.part_names import part_name, upper_first
 from sprag_study.service.reading.reader import Phrase, joined, model_title, plural, term
 from sprag_study.service.reading.wording import number, typed_text, unit_text
-from sprag_study.service.results.asked import goals_of, limits_of
 from sprag_study.service.results.calibration import plan_of
+from sprag_study.service.results.fronts import goals_of, limits_of
 from sprag_study.service.results.selection import tolerance_of
 from sprag_study.service.results.shown_inputs import choice_name, in_words, run_settings
 from sprag_study.service.results.varied import (

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 
+from sprag_study.sentences import Amount, Name
 from sprag_study.service import exports
 from sprag_study.service.answers.goals import Design, DesignGoal, DesignLimit, DesignVariable, FrontReport, Generation
 from sprag_study.service.faults import Fault, FaultError
 from sprag_study.service.json_text import numbers
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.reader import Phrase, term
 from sprag_study.service.results.explore import Further
 from sprag_study.service.results.regimes import kind_columns
 from sprag_study.worker import models
@@ -34,7 +36,8 @@ if TYPE_CHECKING:
     from sprag_study.service.storage.studies.records import RoundRecord
     from sprag_study.worker.arrays import Bools, Floats, Ints
     from sprag_study.worker.models import ResultInfo
-    from sprag_study.worker.planning.goals import Front, Limit
+    from sprag_study.worker.planning.goals import Front
+    from sprag_study.worker.planning.goals.plan import Goal, Limit
     from sprag_study.worker.study import Study
 
 #: Designs that are answered unless more are asked for.
@@ -356,3 +359,31 @@ def front_csv(found: Designs, study: Study, shown: Units, limit: int = DESIGNS) 
         for name in (*found.values, *(f"{one}.{number}" for one in found.values))
     }
     return exports.read_table(columns, units, shown)
+
+
+def goals_of(study: Study) -> list[Phrase]:
+    """The goals of a search: ``Largest mean shaft speed``."""
+    return [_goal_text(own) for own in goal_of(study).best]
+
+
+def limits_of(study: Study) -> list[Phrase]:
+    """The limits of its designs: ``Largest clutch torque at most 3 N·m``."""
+    return [_limit_text(study, own) for own in goal_of(study).subject_to]
+
+
+def _goal_text(goal: Goal) -> Phrase:
+    name = Name(goal.name, within=True)
+    return Phrase("Largest {name}", name=name) if goal.max else Phrase("Smallest {name}", name=name)
+
+
+def _limit_text(study: Study, limit: Limit) -> Phrase:
+    info = next((own for own in models.study_results(study) if own.name == limit.result), None)
+    unit = models.SHARE if info is None else info.unit
+    cell = limit.value if info is None else info.cell(limit.value)
+    value = term(cell) if isinstance(cell, str) else Amount(limit.value, unit)
+    texts = {
+        "at_least": Phrase("{name} at least {value}", name=Name(limit.name), value=value),
+        "at_most": Phrase("{name} at most {value}", name=Name(limit.name), value=value),
+        "is": Phrase("{name} = {value}", name=Name(limit.name), value=value),
+    }
+    return texts[limit.kind]

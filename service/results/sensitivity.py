@@ -44,7 +44,7 @@ from sprag_study.service.results.sensitivity_indices import (
     saltelli_indices,
     sample_indices,
 )
-from sprag_study.service.results.tolerances.nominal import nominal_only
+from sprag_study.service.results.tolerances.batch import nominal_only
 from sprag_study.service.spec.draws.unit import LEVELS, cases_of
 from sprag_study.worker import models
 

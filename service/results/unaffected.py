@@ -10,7 +10,7 @@ import numpy as np
 
 from sprag_study.sentences import Place, Sentence, WarningText
 from sprag_study.service.results.curves import Fetch
-from sprag_study.service.results.tolerances.nominal import nominal_only
+from sprag_study.service.results.tolerances.batch import nominal_only
 from sprag_study.worker import models
 
 if TYPE_CHECKING:

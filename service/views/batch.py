@@ -10,9 +10,8 @@ import numpy as np
 from sprag_study.sentences import Amount, Name, Whole
 from sprag_study.service.reading.catalogue import unit_of
 from sprag_study.service.reading.reader import Phrase, joined, plural
-from sprag_study.service.results.tolerances.nominal import deviations
-from sprag_study.service.results.tolerances.told import at_line, yield_sentence
-from sprag_study.service.results.tolerances.written import percent
+from sprag_study.service.results.tolerances.batch import deviations
+from sprag_study.service.results.tolerances.written import at_line, percent, yield_sentence
 from sprag_study.service.results.tolerances.yields import WANTED
 from sprag_study.service.views.shown import Column, Shown, ShownTable
 

@@ -15,12 +15,11 @@ from sprag_study.service.figures.pictures import draw_map
 from sprag_study.service.figures.read import read_map
 from sprag_study.service.json_text import numbers
 from sprag_study.service.results.choice import held
-from sprag_study.service.results.curve_cases import check_map, select
+from sprag_study.service.results.curve_cases import check_map, drawn_curves, select, stored_curves, stored_map
 from sprag_study.service.results.curves import CurveQuery, Curves, Map, Pairs, flag_names
 from sprag_study.service.results.defaults import completed, drawn_numbers
 from sprag_study.service.results.refined import not_joined
 from sprag_study.service.results.regimes import kind_columns
-from sprag_study.service.results.stored_curves import drawn_curves, stored_curves, stored_map
 from sprag_study.service.views import study_view
 from sprag_study.service.views.study_questions import CURVES, MAP, CurvesQuestion, MapQuestion
 from sprag_study.service.views.study_view import StudyAnswer, StudyView

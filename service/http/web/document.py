@@ -25,9 +25,8 @@ from sprag_study.service.http.web.templates import fragment
 from sprag_study.service.http.work import Attended
 from sprag_study.service.languages import _, pgettext
 from sprag_study.service.report import Office
-from sprag_study.service.report.document import LONGEST_TEXT
+from sprag_study.service.report.document import LONGEST_TEXT, Shown, shown_document
 from sprag_study.service.report.html import embedded
-from sprag_study.service.report.page import Shown, shown_document
 from sprag_study.service.views.library import reading_of
 from sprag_study.service.views.study_questions import ReportQuestion
 

@@ -10,10 +10,9 @@ import numpy as np
 
 from sprag_study.service.results.curves import Fetch
 from sprag_study.service.results.refined import Line
-from sprag_study.service.results.tolerances.batch import Asked, Places, Rows, places_of, read
+from sprag_study.service.results.tolerances.batch import Asked, Places, Rows, deviations, places_of, read
 from sprag_study.service.results.tolerances.causes import Causes, variance_causes
 from sprag_study.service.results.tolerances.conditions import Condition, read_conditions
-from sprag_study.service.results.tolerances.nominal import deviations
 from sprag_study.service.results.tolerances.quantiles import Proportion, proportion
 from sprag_study.worker import models
 

@@ -21,9 +21,9 @@ from sprag_study.service.figures.svg import svg
 from sprag_study.service.http.web.form.spec import field_of, spec_of, values_of
 from sprag_study.service.jobs.local import run_here
 from sprag_study.service.jobs.start_from import with_start
+from sprag_study.service.results.curve_cases import stored_curves
 from sprag_study.service.results.curves import CurveQuery
 from sprag_study.service.results.defaults import main_query
-from sprag_study.service.results.stored_curves import stored_curves
 from sprag_study.service.results.sweeps import hysteresis
 from sprag_study.service.spec.document import parse_spec
 from sprag_study.service.spec.narrow import narrowed_spec

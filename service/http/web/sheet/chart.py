@@ -18,6 +18,7 @@ from sprag_study.service.http.web.figures.drawn import drawn, drawn_map
 from sprag_study.service.reading.catalogue import unit_of
 from sprag_study.service.reading.reader import Phrase, joined
 from sprag_study.service.results.choice import curve_query, map_query, pairs_of
+from sprag_study.service.results.curve_cases import drawn_curves, stored_map
 from sprag_study.service.results.curves import CurveQuery
 from sprag_study.service.results.defaults import caption, main_results
 from sprag_study.service.results.headlines.along import (
@@ -35,7 +36,6 @@ from sprag_study.service.results.key_answers import answers_query
 from sprag_study.service.results.refined import curve_plan
 from sprag_study.service.results.refined_maps import map_plan
 from sprag_study.service.results.selection import numeric_names
-from sprag_study.service.results.stored_curves import drawn_curves, stored_map
 from sprag_study.service.results.tolerances.ribbons import QUANTILES
 from sprag_study.service.views.answers import answers_in
 from sprag_study.service.views.calibration import CalibrationView

@@ -7,8 +7,8 @@ import pytest
 from scipy.stats import norm, qmc
 
 from sprag_study.service.results.tolerances import causes
-from sprag_study.service.results.tolerances.shares import LEAST_DRIVES, Share, shares
-from sprag_study.service.results.tolerances.told import causes_sentences
+from sprag_study.service.results.tolerances.causes import LEAST_DRIVES, Share, shares
+from sprag_study.service.results.tolerances.written import causes_sentences
 from sprag_study.service.spec.document import parse_spec
 from tests.service.results.tolerances.conftest import SPEC
 
