@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
-from itertools import pairwise
+from itertools import pairwise, takewhile
 from zoneinfo import ZoneInfo
 
 import pytest
@@ -54,19 +54,18 @@ def minutes(change: datetime) -> Iterator[datetime]:
 def due_times(expression: str, zone: str, change: datetime) -> list[datetime]:
     """Those at which the expression is due, by what the wall clock shows at each of them."""
     expression = {"@daily": "0 0 * * *", "@hourly": "0 * * * *"}.get(expression, expression)
-
-    def shows(wall: datetime) -> bool:
-        return next(CronSim(expression, wall - SECOND)) == wall
-
     walls = {moment: moment.astimezone(ZoneInfo(zone)).replace(tzinfo=None) for moment in minutes(change)}
+    # A clock that never changes.
+    steady = CronSim(expression, min(walls.values()) - SECOND)
+    shown = set(takewhile(max(walls.values()).__ge__, steady))
     if any(field.startswith("*") for field in expression.split()[:2]):
-        return [moment for moment, wall in walls.items() if shows(wall)]
+        return [moment for moment, wall in walls.items() if wall in shown]
     found, latest = [], min(walls.values()) - MINUTE
     for moment, wall in walls.items():
         # The times that the clock has not shown before, and those that it skips.
         if wall > latest:
             skipped = (latest + number * MINUTE for number in range(1, (wall - latest) // MINUTE + 1))
-            found += [moment] if any(map(shows, skipped)) else []
+            found += [moment] if not shown.isdisjoint(skipped) else []
             latest = wall
     return found
 
