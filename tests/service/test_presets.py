@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from sprag_study.service.presets import ABOUT, preset_names, preset_text
 from sprag_study.service.spec.document import format_of, load_spec, parse_spec
 from sprag_study.worker import models
-from sprag_study.worker.study import Axis, Study
+from sprag_study.worker.study import Study
 
 MACHINES = [name for name in preset_names() if "machine-shaft" in preset_text(name)[1]]
 
@@ -50,31 +49,33 @@ def test_machines_run(name: str) -> None:
     assert np.nanmax(results["balance.work"]) < 1e-9
 
 
-def new_kinds(name: str, varied: set[str]) -> tuple[Study, list[str]]:
-    """A machine without axes, and its numbers of other kinds than ``varied``, which are added there.
+def new_kinds(name: str, varied: set[str]) -> tuple[Any, list[str]]:
+    """The spec of a machine without axes, and its numbers of other kinds than ``varied``, which are added there.
 
     Of equal parts, steps and the like it has the numbers of the last one.
     """
     file, text = preset_text(name)
     spec: Any = load_spec(text, format_of(file))
     spec.pop("goal", None)
-    base = parse_spec(spec | {"axes": []}).study
-    kinds = {re.sub(r"\.\d+(?=\.|$)", ".N", path): path for path in models.parameters_of(base)}
+    spec["axes"] = []
+    kinds = {re.sub(r"\.\d+(?=\.|$)", ".N", path): path for path in models.parameters_of(parse_spec(spec).study)}
     new = [path for kind, path in kinds.items() if kind not in varied]
     varied |= set(kinds)
-    return base, new
+    return spec, new
 
 
 def test_any_number_varies_alone_and_in_batches() -> None:
-    """Each kind of number is varied in the first machine that has it."""
+    """Each kind of number is an axis of the first machine that has it."""
     varied: set[str] = set()
     for name in MACHINES:
-        base, paths = new_kinds(name, varied)
+        spec, paths = new_kinds(name, varied)
+        base = parse_spec(spec).study
         for path in paths:
             parameter = models.parameters_of(base)[path]
             value = base.base.get(path, 0.5)
             values = [v for v in (0.97 * value, 1.02 * value + 1e-3) if parameter.accepts(v)]
-            study = replace(base, axes=(Axis((path,), tuple(dict.fromkeys(values))),))
+            study = parse_spec(spec | {"axes": [{"path": path, "values": list(dict.fromkeys(values))}]}).study
+            assert study.axis_paths == (path,)
             batch = models.run_chunk(study, 0, study.cases)
             for case in range(study.cases):
                 alone = models.run_chunk(study, case, 1)

@@ -12,10 +12,8 @@ import jsonschema
 import pytest
 
 from sprag_study.service.faults import Fault, warned
-from sprag_study.service.presets import preset_names, preset_text
-from sprag_study.service.spec.document import SpecError, format_of, load_spec, parse_spec
+from sprag_study.service.spec.document import SpecError, parse_spec
 from sprag_study.service.spec.schema.document import spec_schema
-from sprag_study.worker.models import parameters_of
 from sprag_study.worker.study import Study
 
 PRESS: dict[str, Any] = tomllib.loads(
@@ -290,23 +288,6 @@ def test_a_limit_that_the_base_does_not_give_can_vary(combine: str) -> None:
         assert "wanted_irregularity" in problems(changes)["/axes"].message
     else:
         assert study(changes=changes).cases == (4 if combine == "grid" else 2)
-
-
-def test_every_number_of_a_machine_can_be_an_axis() -> None:
-    """Each in the first preset that has it."""
-    known = set[str]()
-    for name in preset_names():
-        file, text = preset_text(name)
-        spec: Any = load_spec(text, format_of(file))
-        spec.pop("goal", None)
-        if spec["model"] != "machine-shaft":
-            continue
-        base = parse_spec(spec | {"axes": []}).study
-        for path in sorted({*parameters_of(base)} - known):
-            value = base.base.get(path, 0.5)
-            made = parse_spec(spec | {"axes": [{"path": path, "values": [value]}]}).study
-            assert made.axis_paths == (path,)
-        known.update(parameters_of(base))
 
 
 def test_what_is_odd_is_warned_of() -> None:
