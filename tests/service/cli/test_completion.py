@@ -109,28 +109,37 @@ def test_schedules_tokens_and_users_are_completed(
         assert completion.schedules(context, "ni")[1:] == [("nightly", kept["id"])]
 
 
-@pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
-def test_bash_completes_what_options_take(program: dict[str, str], service: Service, spec: dict[str, Any]) -> None:
+def test_options_are_completed(
+    sprag: Sprag, monkeypatch: pytest.MonkeyPatch, service: Service, spec: dict[str, Any]
+) -> None:
+    """By what the program says to bash."""
+    monkeypatch.setenv("_SPRAG_COMPLETE", "complete_bash")
+
+    def offers(*words: str) -> list[str]:
+        monkeypatch.setenv("COMP_WORDS", " ".join(("sprag", *words)))
+        monkeypatch.setenv("COMP_CWORD", str(len(words)))
+        return list(sprag().out.split())
+
     study = service.submit({**spec, "name": "feeder"})
     case = service.get(f"/studies/{study}/cases/0")
     with served(service.app) as address:
-        program["SPRAG_SERVER"] = address
+        monkeypatch.setenv("SPRAG_SERVER", address)
         quantities = [*case["parameters"], *case["results"]]
-        assert offered(program, "cases", study, "--sort", "") == ["case", "ending", "flags", *quantities]
-        assert offered(program, "cases", "fee", "--sort", "shaft.l") == ["shaft.load"]
-        assert offered(program, "explore", "latest", "--limit", "3", "--show", "") == quantities
-        assert offered(program, "curve", study, "--x", "") == [*case["parameters"]]
-        assert offered(program, "compare", study, "latest", "--y", "eff") == ["efficiency"]
-        assert offered(program, "cases", "--sort", "") == ["case", "ending", "flags"], "no study is named yet"
-        assert offered(program, "models", "") == [m["name"] for m in service.get("/models")["models"]]
-        assert offered(program, "list", "--model", "m") == ["machine-shaft"]
-    assert offered(program, "cases", study, "--sort", "shaft") == [], "no service answers"
-    assert offered(program, "cases", study, "--ending", "c") == ["chatter", "cannot_assemble", "crashed", "cancelled"]
-    assert offered(program, "cases", study, "--regime", "") == [*REGIME_SENTENCES][1:]
-    assert offered(program, "explore", study, "--flag", "un") == ["unsettled"]
-    assert offered(program, "retry", study, "--ending", "chat") == ["chatter"]
-    assert offered(program, "presets", "p") == ["press", "punching_press"]
-    assert offered(program, "list", "--sort", "n") == ["newest", "name"]
+        assert offers("cases", study, "--sort", "") == ["case", "ending", "flags", *quantities]
+        assert offers("cases", "fee", "--sort", "shaft.l") == ["shaft.load"]
+        assert offers("explore", "latest", "--limit", "3", "--show", "") == quantities
+        assert offers("curve", study, "--x", "") == [*case["parameters"]]
+        assert offers("compare", study, "latest", "--y", "eff") == ["efficiency"]
+        assert offers("cases", "--sort", "") == ["case", "ending", "flags"], "no study is named yet"
+        assert offers("models", "") == [m["name"] for m in service.get("/models")["models"]]
+        assert offers("list", "--model", "m") == ["machine-shaft"]
+    assert offers("cases", study, "--sort", "shaft") == [], "no service answers"
+    assert offers("cases", study, "--ending", "c") == ["chatter", "cannot_assemble", "crashed", "cancelled"]
+    assert offers("cases", study, "--regime", "") == [*REGIME_SENTENCES][1:]
+    assert offers("explore", study, "--flag", "un") == ["unsettled"]
+    assert offers("retry", study, "--ending", "chat") == ["chatter"]
+    assert offers("presets", "p") == ["press", "punching_press"]
+    assert offers("list", "--sort", "n") == ["newest", "name"]
 
 
 def test_every_ending_and_flag_is_offered() -> None:

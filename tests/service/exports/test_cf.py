@@ -23,6 +23,7 @@ from tests.service.swept_study import swept_study
 if TYPE_CHECKING:
     from tests.service.conftest import Service
 
+Change = Callable[[dict[str, Any]], None]
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 #: A unit as UDUNITS reads it: symbols of the SI with whole powers.
 SYMBOL = r"(?:m|kg|s|rad|N|J|W|Pa|Hz)(?:\^-?\d)?"
@@ -59,18 +60,30 @@ def single(spec: dict[str, Any]) -> None:
     spec["axes"] = []
 
 
-@pytest.fixture(params=[grid, together, drives, single, None], ids=["grid", "zip", "drives", "single", "sweep"])
-def file(request: pytest.FixtureRequest, service: Service, spec: dict[str, Any]) -> Iterator[h5py.File]:
-    """The file of a study."""
-    change: Callable[[dict[str, Any]], None] | None = request.param
+def written(service: Service, spec: dict[str, Any], change: Change | None) -> bytes:
+    """The file of a study that has ended."""
     if change is None:
         study_id = swept_study(service)
     else:
         change(spec)
         study_id = service.submit(spec)
         service.fill(study_id)
-    content = service.http.get(f"/api/v1/studies/{study_id}/results?format=netcdf").content
-    with h5py.File(io.BytesIO(content)) as opened:
+    return service.http.get(f"/api/v1/studies/{study_id}/results?format=netcdf").content
+
+
+@pytest.fixture(scope="module")
+def contents() -> dict[Change | None, bytes]:
+    """The files that have been written, which all tests read."""
+    return {}
+
+
+@pytest.fixture(params=[grid, together, drives, single, None], ids=["grid", "zip", "drives", "single", "sweep"])
+def file(request: pytest.FixtureRequest, contents: dict[Change | None, bytes]) -> Iterator[h5py.File]:
+    """The file of a study."""
+    change: Change | None = request.param
+    if change not in contents:
+        contents[change] = written(request.getfixturevalue("service"), request.getfixturevalue("spec"), change)
+    with h5py.File(io.BytesIO(contents[change])) as opened:
         yield opened
 
 

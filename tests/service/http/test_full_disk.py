@@ -94,6 +94,7 @@ def refuse(folder: Path, _size: int) -> None:
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(folder))
 
 
+@pytest.mark.parametrize("chunk_cases", [1_000])
 def test_a_grid_is_smaller_than_the_room_it_asks_for(
     service: Service, ended: str, spec: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -85,8 +85,8 @@ def test_the_document_says_whether_a_token_is_needed(service: Service, settings:
     app = create_app(with_token, store=service.store, computer=service.computer, checker=service.checker)
     header = {"Authorization": "Bearer correct-horse-battery-staple"}
     guarded = connect(app).get("/openapi.json", headers=header).json()
-    OpenAPIV31SpecValidator(guarded).validate()
     opened = service.http.get("/openapi.json").json()
+    assert guarded["components"] == opened["components"]
     for path, method, operation in operations(guarded):
         wanted: list[dict[str, list[str]]] = [] if path in OPEN_PATHS else [{"bearer": []}]
         assert operation["security"] == wanted, (path, method)
