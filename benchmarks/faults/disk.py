@@ -17,9 +17,9 @@ from sprag_study.service.storage.work.room import RESERVE_BYTES
 _STATE = "SELECT state FROM studies WHERE id = ?"
 
 
-def file_limit(folder: Path, *, cases: int, studies: int) -> dict[str, Any]:
+def file_limit(folder: Path, *, cases: int, studies: int, periods: float = 20.0) -> dict[str, Any]:
     """Run three or more studies under a limit of file sizes too small for all, and raise it when they are held."""
-    specs = [harness.spec(cases, 20.0 + 0.5 * number) for number in range(studies)]  # none has rows for another
+    specs = [harness.spec(cases, periods + 0.5 * number) for number in range(studies)]  # none has rows for another
     empty = folder / "empty.sqlite3"
     Store.open(f"sqlite:///{empty}").close()
     # Half of them: enough for each alone, and so little that they are held long before the last one ends.

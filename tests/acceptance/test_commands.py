@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -201,12 +202,16 @@ def test_a_reader_that_goes_away_is_no_failure_to_talk_about(tmp_path: Path) -> 
         assert process.wait(SECONDS) == 141
 
 
-#: Commands that write with each of the ways to write: tables, plain text, JSON, click's help, a service.
-WRITING = ("presets", "token", "presets --json", "run --help", "serve --json --port 0 --db x.sqlite3")
+SERVE = "serve --json --port 0 --db x.sqlite3"
+#: Commands that write with each of the ways to write: tables, plain text, JSON, click's help, a service; and each way
+#: to have no reader.
+WITHOUT_READER = [
+    *product(("presets", "token", "presets --json", "run --help"), (">&-", ">&- <&-", "| true")),
+    (SERVE, ">&- <&-"),
+]
 
 
-@pytest.mark.parametrize("redirection", [">&-", ">&- <&-", "| true"])
-@pytest.mark.parametrize("command", WRITING)
+@pytest.mark.parametrize(("command", "redirection"), WITHOUT_READER)
 def test_a_closed_standard_output_ends_quietly(tmp_path: Path, command: str, redirection: str) -> None:
     script = f'{{ "$@"; echo $? >code; }} 2>said {redirection}'
     done = subprocess.run(

@@ -115,14 +115,13 @@ def test_the_command_serves_with_a_token_only(image: Image, tmp_path: Path) -> N
     assert "Traceback" not in log.read_text()
 
 
-@pytest.mark.parametrize(("host", "prefix"), [("0.0.0.0", ""), ("::", "/sprag")])
 def test_the_health_check_asks_where_the_service_listens(
-    image: Image, certificate: tuple[Path, Path], tmp_path: Path, host: str, prefix: str
+    image: Image, certificate: tuple[Path, Path], tmp_path: Path
 ) -> None:
-    """By TLS, at the port, host and prefix of environment and file; it fails where nobody answers."""
+    """By TLS, at the port, host and prefix of a file; it fails where nobody answers."""
     file = tmp_path / "settings.toml"
     file.write_text(
-        f'port = {free_port()}\nhost = "{host}"\nurl_prefix = "{prefix}"\n'
+        f'port = {free_port()}\nhost = "::"\nurl_prefix = "/sprag"\n'
         f'tls_certificate = "{certificate[0]}"\ntls_key = "{certificate[1]}"\n'
     )
     # The image sets host and port; in the environment nothing means the file.

@@ -13,7 +13,7 @@ from typing import Any
 import httpx
 import pytest
 
-from benchmarks.same_rows import SETTLED_AXES, TIMED, example, same_rows
+from benchmarks.same_rows import SETTLED_AXES, TIMED, example, rows_of
 from tests.acceptance.processes import SECONDS, service
 from tests.conftest import Finished
 
@@ -29,16 +29,23 @@ FEW = example(run=TIMED, axes=AXES)
 
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
-    """The rows of `FEW`, the same in two cuts."""
-    return same_rows(tmp_path_factory.mktemp("runs"), FEW, [(1, 32, ()), (2, 1, ("--finish-by", "1 h"))])
+    """The rows of `FEW`, case by case in two processes and in an order of their own."""
+    return rows_of(tmp_path_factory.mktemp("runs"), FEW, (2, 1, ("--finish-by", "1 h")))
 
 
-def test_run_gives_the_same_rows_in_any_cut(reference: list[dict[str, Any]]) -> None:
-    assert len(reference) == 32
+def here(sprag: Callable[..., Finished], folder: Path, spec: dict[str, Any]) -> list[dict[str, Any]]:
+    """The rows of a study that is run as one chunk."""
+    (folder / "here.json").write_text(json.dumps(spec), encoding="utf-8")
+    rows: list[dict[str, Any]] = sprag("run", folder / "here.json", "--json", "--chunk", 64).data["rows"]
+    assert [row["case"] for row in rows] == list(range(len(rows)))
+    assert {row["ending"] for row in rows} == {"ok"}
+    return rows
 
 
-def test_settled_cases_have_the_same_rows_in_any_cut(tmp_path: Path) -> None:
-    rows = same_rows(tmp_path, example(axes=SETTLED_AXES), [(1, 20, ()), (2, 7, ())])
+def test_settled_cases_have_the_same_rows_in_any_cut(tmp_path: Path, sprag: Callable[..., Finished]) -> None:
+    spec = example(axes=SETTLED_AXES)
+    rows = here(sprag, tmp_path, spec)
+    assert rows_of(tmp_path, spec, (2, 7, ())) == rows
     assert {row["results"]["regime"] for row in rows} >= {"periodic", "coasting"}
 
 
@@ -66,11 +73,12 @@ def test_http_gives_the_same_rows_and_curves(tmp_path: Path, reference: list[dic
     assert seen == set(range(32))
 
 
-def test_csv_has_the_same_numbers(tmp_path: Path, sprag: Callable[..., Finished]) -> None:
-    spec, file = tmp_path / "spec.json", tmp_path / "rows.csv"
-    spec.write_text(json.dumps(FEW), encoding="utf-8")
-    rows = sprag("run", spec, "--json").data["rows"]
-    assert sprag("run", spec, "-o", file).code == 0
+def test_run_gives_the_same_rows_in_any_cut_and_csv_the_same_numbers(
+    tmp_path: Path, sprag: Callable[..., Finished], reference: list[dict[str, Any]]
+) -> None:
+    rows, file = here(sprag, tmp_path, FEW), tmp_path / "rows.csv"
+    assert rows == reference
+    assert sprag("run", tmp_path / "here.json", "-o", file).code == 0
     header, *lines = [line.split(",") for line in file.read_text().splitlines()]
     assert len(lines) == len(rows) == 32
     for line, row in zip(lines, rows, strict=True):
