@@ -24,7 +24,7 @@ from sprag_study.service.reading.numbers import parse_number
 from sprag_study.service.reading.part_names import lower_first
 from sprag_study.service.reading.printed import could_be_several
 from sprag_study.service.reading.together import with_last_unit
-from sprag_study.service.reading.units import QuantityError, parse_quantity, split_typed
+from sprag_study.service.reading.units import parse_quantity, split_typed
 from sprag_study.service.reading.wording import unit_text
 from sprag_study.service.spec.derive import formulas_of, with_values
 from sprag_study.service.spec.fields import base_path, base_pointer
@@ -36,10 +36,11 @@ from sprag_study.worker.models.form import FormChoice, FormField
 #: Beginning of a field with the formula of a derived parameter.
 FORMULA: Final = "="
 _STEP: Final = (N_("from"), N_("to"), N_("value"))
-#: Heading and unit of the columns of tables.
+#: Headings and SI units of the columns of tables.
 _COLUMNS: Final = {
-    "angle": "angle [rad]", "stroke": "fraction", "time": "time [s]", "speed": "speed [rad/s]", "force": "force [N]",
-    "torque": "torque [N*m]", "inertia": "inertia [kg*m^2]", "pressure": "pressure [Pa]",
+    "angle": ("angle", "rad"), "stroke": ("fraction", "1"), "time": ("time", "s"), "speed": ("speed", "rad/s"),
+    "force": ("force", "N"), "torque": ("torque", "N*m"), "inertia": ("inertia", "kg*m^2"),
+    "pressure": ("pressure", "Pa"),
 }  # fmt: skip
 
 
@@ -267,14 +268,18 @@ def _text(entry: Entry, base: Mapping[str, Any]) -> str | None:
             return "on" if on else None
         case "table" if value is None:
             rows = _at(base, re.sub("/csv$", "/table", entry.name))
-            return None if rows is None else _csv(entry, base, rows)
+            names = [
+                str(_at(base, f"{entry.place}/{name[1:]}") or "angle") if name.startswith("@") else name
+                for name in entry.item.columns
+            ]
+            return None if rows is None else _table(names, rows, ",")
     if value is None:
         return None
     match entry.item.kind:
         case "list":
             return "; ".join(map(text_of, value))
         case "measured":
-            return _measured_text(value)
+            return _table(("angle", "torque"), value, "\t")
         case "constants":
             return "\n".join(f"{name} = {text_of(item)}" for name, item in value.items())
         case "steps":
@@ -284,42 +289,22 @@ def _text(entry: Entry, base: Mapping[str, Any]) -> str | None:
     return text_of(value)
 
 
-def _measured_text(rows: Sequence[Sequence[Any]]) -> str:
-    """Measured rows as a table: each column as it was typed where all of it has one unit, otherwise in SI."""
-    angles, torques = (
-        _column(list(column), name, si)
-        for column, name, si in zip(zip(*rows, strict=True), ("angle", "torque"), ("rad", "N*m"), strict=True)
-    )
-    return "\n".join("\t".join(cells) for cells in zip(angles, torques, strict=True))
+def _table(names: Sequence[str], rows: Sequence[Sequence[Any]], separator: str) -> str:
+    """Rows as a table: each column as it was typed where all of it has one unit, otherwise in SI."""
+    columns = [_column(name, cells, separator) for name, cells in zip(names, zip(*rows, strict=True), strict=True)]
+    return "\n".join(separator.join(cells) for cells in zip(*columns, strict=True))
 
 
-def _column(cells: Sequence[Any], name: str, si: str) -> list[str]:
-    """Heading and numbers of a column of quantities."""
-    numbers = [_si(cell, si) for cell in cells]
+def _column(name: str, cells: Sequence[Any], separator: str) -> list[str]:
+    """Heading and numbers of a column of quantities; raises QuantityError."""
+    heading, si = _COLUMNS[name]
+    numbers = [parse_quantity(cell, si) for cell in cells]
     units = {split_typed(cell)[1] if isinstance(cell, str) else "" for cell in cells}
-    if len(units) == 1 and (unit := units.pop()):
+    if si != "1" and len(units) == 1 and (unit := units.pop()):
         typed = [cell.strip().removesuffix(unit).strip() for cell in cells]
-        # A blank that separates thousands could be read as the end of a cell.
-        if all(parse_number(text) is not None and len(text.split()) == 1 for text in typed):
-            return [f"{name} [{unit}]", *typed]
-    return [f"{name}_{si.replace('*', '')}", *map(repr, numbers)]
-
-
-def _csv(entry: Entry, base: Mapping[str, Any], rows: Sequence[Sequence[Any]]) -> str:
-    """A table of rows as the text of a CSV file in SI units."""
-    assert isinstance(entry.item, FormField)
-    names = [
-        str(_at(base, f"{entry.place}/{name[1:]}") or "angle") if name.startswith("@") else name
-        for name in entry.item.columns
-    ]
-    headings = [_COLUMNS[name] for name in names]
-    units = [re.sub(r".*\[(.*)\]|.*", r"\1", heading) or "1" for heading in headings]
-    lines = (",".join(repr(_si(cell, unit)) for cell, unit in zip(row, units, strict=True)) for row in rows)
-    return "\n".join([",".join(headings), *lines])
-
-
-def _si(value: Any, unit: str) -> float:
-    try:
-        return parse_quantity(value, unit)
-    except QuantityError as error:
-        raise ValueError(str(error)) from error
+        # A sign that separates thousands could be read as the end of a cell.
+        if all(parse_number(text) is not None and len(text.split()) == 1 and separator not in text for text in typed):
+            return [f"{heading} [{unit}]", *typed]
+    if si != "1":
+        heading += f" [{si}]" if separator == "," else f"_{si.replace('*', '')}"
+    return [heading, *map(repr, numbers)]

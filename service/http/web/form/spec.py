@@ -22,13 +22,15 @@ from sprag_study.service.http.web.form.entries import (
 from sprag_study.service.http.web.form.machine import form_of, model_name
 from sprag_study.service.http.web.form.machine_spec import Machine
 from sprag_study.service.http.web.form.tolerances import BATCH, FIELDS, Tolerances, with_batch
-from sprag_study.service.http.web.form.walk import Cell, Filled, Record, Rows, chosen, ticked, typed
+from sprag_study.service.http.web.form.walk import Cell, Filled, Record, Rows, chosen, described, typed
 from sprag_study.service.languages import N_, _
 from sprag_study.service.reading.together import with_last_unit
 from sprag_study.service.spec.axes.axes import SWEPT
 from sprag_study.service.spec.axes.sample import SAMPLE, SCALE
+from sprag_study.service.spec.described import ANY_RUN, SETTLED_RUN
 from sprag_study.service.spec.kinds.goal import GOAL
 from sprag_study.service.spec.kinds.refine import REFINE
+from sprag_study.service.spec.kinds.tolerances import DRAWS
 from sprag_study.service.spec.report import join
 from sprag_study.service.spec.run import TIMED_DEFAULTS, TIMED_FIELDS, time_text
 from sprag_study.worker import models
@@ -293,26 +295,15 @@ PARTS: Final = {
         ),
     )
 }  # fmt: skip
-_SAMPLE: Final = Record(
-    (
-        chosen("sample", SAMPLE.described["sample"].values[0], always=True), typed("count"), typed("seed"),
-        ticked("second_order"), PARTS["ranges"],
-    ),
-    whole="/count",
-)  # fmt: skip
-_RUN: Final = Record(
-    (_UNTIL, *map(typed, ("at_most", "max_period", "settled", "tolerance")), _WINDOW, chosen("reset", "contact")),
-    key="run", when=lambda values: form_of(values).with_run,
-)  # fmt: skip
+_SAMPLE: Final = Record((*described(SAMPLE.described.values()), PARTS["ranges"]), whole="/count")
+_TIMES: Final = [entry for entry in (*SETTLED_RUN.values(), *ANY_RUN.values()) if entry.name != "until"]
+_RUN: Final = Record((_UNTIL, _WINDOW, *described(_TIMES)), key="run", when=lambda values: form_of(values).with_run)
 _GOAL: Final = Record(
-    (
-        PARTS["vary"], PARTS["best"], PARTS["subject_to"], _Points(), chosen("over", "worst"),
-        *map(typed, ("population", "generations", "seed")), ticked("polish", usual=True),
-    ),
+    (PARTS["vary"], PARTS["best"], PARTS["subject_to"], _Points(), *described(GOAL.described.values())),
     whole="", key="goal", when=is_search, new=GOAL_DEFAULTS,
 )  # fmt: skip
 _REFINE: Final = Record(
-    (typed("results", names_of, "; ".join), *map(typed, REFINE.described)), whole="/results", key="refine",
+    (typed("results", names_of, "; ".join), *described(REFINE.described.values())), whole="/results", key="refine",
     when=lambda values: any(values.get(f"/axes/{row}/way") == "adaptive" for row in PARTS["axes"].filled(values)),
     new=REFINE_DEFAULTS,
 )  # fmt: skip
@@ -320,7 +311,7 @@ _CASES: Final = Record(
     (_Axes(), PARTS["exclude"], chosen("combine", "grid", always=True), _REFINE),
     when=lambda values: not is_search(values),
 )  # fmt: skip
-_BATCH: Final = Record((Tolerances(), *map(typed, FIELDS[1:]), PARTS["correlations"]), when=with_batch)
+_BATCH: Final = Record((Tolerances(), *described(DRAWS.values()), PARTS["correlations"]), when=with_batch)
 _STUDY: Final = Record((typed("name", str), Machine(), _RUN, _BATCH, _GOAL, _CASES))
 
 

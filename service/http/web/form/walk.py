@@ -5,7 +5,7 @@ A part of a spec is described once, by members that know their entries and the f
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -24,6 +24,7 @@ from sprag_study.service.http.web.form.entries import (
 from sprag_study.service.http.web.form.machine import BASE
 from sprag_study.service.reading.numbers import in_language, settled
 from sprag_study.service.reading.together import with_last_unit
+from sprag_study.service.spec.described import Described
 from sprag_study.worker.models import form as data
 
 
@@ -164,6 +165,16 @@ def ticked(name: str, *, usual: bool = False) -> Cell:
         (name,), (name,), lambda form: {name: on} if (on := form.text(name) == "on") != usual else {},
         lambda item: {name: "on"} if item.get(name, usual) else {}, counts=False,
     )  # fmt: skip
+
+
+def described(entries: Iterable[Described]) -> list[Cell]:
+    """Entries of a spec by their descriptions."""
+    return [
+        ticked(entry.name, usual=entry.default) if entry.kind == "flag"
+        else chosen(entry.name, entry.default or entry.values[0], always=entry.default is None)
+        if entry.kind == "choice" else typed(entry.name)
+        for entry in entries
+    ]  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

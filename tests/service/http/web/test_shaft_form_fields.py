@@ -48,7 +48,12 @@ def test_a_measured_motor_goes_through_the_form() -> None:
     base = {name: value for name, value in PRESS["base"].items() if name not in {"mean_speed", "balance"}}
     base |= {"drive": drive, "operation": {"quantity": "torque", "value": 20}}
     spec = {"sprag": 1, "model": "machine-shaft", "name": "motor", "base": base, "axes": []}
-    assert parse_spec(spec_of(values_of(spec))[0]).study == parse_spec(spec).study
+    values = values_of(spec)
+    assert parse_spec(spec_of(values)[0]).study == parse_spec(spec).study
+    table = values["/base/drive/motor/csv"]
+    assert table.splitlines()[:3] == ["speed [rpm],torque [N*m]", "0,60", "120,40"]  # as it was typed
+    rows[1] = ["120,5 rpm", "40 N*m"]  # its comma could be read as the end of the cell
+    assert values_of(spec)["/base/drive/motor/csv"].startswith("speed [rad/s],torque [N*m]")
 
 
 @pytest.mark.parametrize("indicated", [False, True])
