@@ -15,6 +15,7 @@ from sprag_study.worker import models
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from sprag_study.service.reading.reader import Reading
     from sprag_study.worker.models import ClutchFit
 
 WIDTH: Final = 560
@@ -32,7 +33,10 @@ class Tick:
 
 @dataclass(frozen=True, slots=True)
 class FitChart:
-    """Geometry of the picture, in its own units; the template draws it."""
+    """Geometry of the picture, in its own units; the template draws it.
+
+    ``windup``, ``torque`` and ``accuracy`` are the ends of its axes (SI), where the numbers of a reader stand.
+    """
 
     width: float
     height: float
@@ -45,9 +49,19 @@ class FitChart:
     residuals: list[tuple[float, float]]
     zero: float
     band: tuple[float, float]
-    x_ticks: list[Tick]
-    law_ticks: list[Tick]
-    rest_ticks: list[Tick]
+    windup: float
+    torque: tuple[float, float]
+    accuracy: float
+
+    def x_ticks(self, reading: Reading) -> list[Tick]:
+        """Numbers of the windup."""
+        return _ticks((0.0, self.windup), (self.left, self.right), "rad", reading)
+
+    def torque_ticks(self, reading: Reading) -> list[Tick]:
+        """Numbers of the torque and of its residuals."""
+        shown = number(reading.value(self.accuracy, "N*m"), 3)
+        rest = [Tick(self.band[0], shown), Tick(self.zero, "0"), Tick(self.band[1], f"−{shown}")]
+        return _ticks(self.torque, (self.law[1], self.law[0]), "N*m", reading) + rest
 
 
 def fit_chart(fit: ClutchFit, clutch: Mapping[str, Any], backlash: float) -> FitChart:
@@ -83,10 +97,17 @@ def fit_chart(fit: ClutchFit, clutch: Mapping[str, Any], backlash: float) -> Fit
         [(round(x(a), 1), round(r(v), 1)) for a, v in zip(windup.tolist(), fit.residuals, strict=True)],
         round(r(0.0), 1),
         (round(r(fit.accuracy), 1), round(r(-fit.accuracy), 1)),
-        [Tick(x(value), number(value, 4)) for value in _round_steps(0.0, fit.windup_limit)],
-        [Tick(y(value), number(value, 4)) for value in _round_steps(low, high)],
-        [Tick(r(value), number(value, 3)) for value in (fit.accuracy, 0.0, -fit.accuracy)],
+        fit.windup_limit,
+        (low, high),
+        fit.accuracy,
     )
+
+
+def _ticks(ends: tuple[float, float], places: tuple[float, float], si: str, reading: Reading) -> list[Tick]:
+    """Round numbers of the reader between two ends (SI), which stand at these places."""
+    low, high = (reading.value(end, si) for end in ends)
+    size = (places[1] - places[0]) / ((high - low) or 1.0)
+    return [Tick(places[0] + (value - low) * size, number(value, 4)) for value in _round_steps(low, high)]
 
 
 def _round_steps(low: float, high: float, wanted: int = 5) -> Sequence[float]:

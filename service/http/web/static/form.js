@@ -5,6 +5,7 @@ let form = document.getElementById("study-form");
 let waiting = null, latest = 0;
 const touched = new Set();
 let old = false; // the panel is out of date; it is requested again once the connection is restored
+let redrawn = false; // the form was made again for its drawings
 let whole = false; // after a full check, empty required fields are reported too
 
 let edited = ""; // name of the field that was changed last: what is wrong with a whole part is shown beside it
@@ -76,6 +77,7 @@ const check = async () => {
   }
   const pictures = form.querySelectorAll(".picture");
   if (pictures.length === (found.pictures || []).length) pictures.forEach((place, index) => { place.innerHTML = found.pictures[index]; });
+  else if (!pictures.length && !redrawn) { redrawn = true; reshape([]); } // a page that was made before the service could draw
   const go = document.getElementById("go");
   if (go && found.run) go.textContent = found.run;
   const open = [...panel.querySelectorAll("details")].map((part) => part.open);

@@ -13,6 +13,7 @@ from playwright.sync_api import expect
 
 from sprag_study.service.figures.drawings import BETWEEN_FIELDS, drawings
 from sprag_study.service.http.views import preset_of
+from sprag_study.service.http.web.figures.fits import fits_of
 from sprag_study.service.http.web.form.check import check_form
 from sprag_study.service.http.web.form.machine import Entry, choices_of, entries
 from sprag_study.service.http.web.form.machine_spec import base_of, values_of_base
@@ -22,14 +23,17 @@ from sprag_study.service.http.web.form.sheet import sheet_of
 from sprag_study.service.http.web.form.spec import spec_of, values_of
 from sprag_study.service.http.web.form.undo import history_of
 from sprag_study.service.presets import preset_names
+from sprag_study.service.reading.quantities import Units
+from sprag_study.service.reading.reader import Reading
 from sprag_study.service.spec.document import parse_spec
 from sprag_study.worker import models
 from sprag_study.worker.chunking import Chunking
 from tests.acceptance.processes import EXAMPLES
 from tests.service.http.web.controls import Controls
+from tests.service.http.web.fields import wrong
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Page
+    from playwright.sync_api import Page, Route
 
     from tests.service.conftest import Service
     from tests.service.http.web.conftest import Visitor
@@ -255,3 +259,49 @@ def test_no_label_is_cut(visitor: Visitor, width: int) -> None:
         )
         assert page.locator(".dim > label:visible").evaluate_all(cut) == []
         assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_the_chart_of_a_measured_clutch_is_in_the_units_of_the_reader() -> None:
+    spec = json.loads((EXAMPLES / "measured_clutch.json").read_text(encoding="utf-8"))
+    ((_fit, chart),) = fits_of(spec, parse_spec(spec).study).values()
+    for units, windups, torques in (
+        (Units(), ["0", "0.02", "0.04"], ["0", "5", "10"]),
+        (Units({"rad": "deg", "N*m": "N*mm"}), ["0", "1", "2", "3"], ["0", "5000", "10\N{NARROW NO-BREAK SPACE}000"]),
+    ):
+        reading = Reading(models.VIBRATION_DRIVE, units)
+        assert [tick.text for tick in chart.x_ticks(reading)] == windups
+        assert [tick.text for tick in chart.torque_ticks(reading)][:-3] == torques
+    ends = chart.x_ticks(reading)
+    assert (ends[0].at, ends[-1].at) == pytest.approx((chart.left, chart.right))
+
+
+def test_a_form_without_drawings_gets_them_once_the_service_draws(visitor: Visitor) -> None:
+    page = visitor.page
+    _ready(page)
+
+    def without(route: Route) -> None:
+        answer = route.fetch()
+        text = re.sub(r'(?s)<div class="picture">.*?</svg></div>', "", answer.text())
+        route.fulfill(response=answer, body=text.replace('data-check="', 'data-unchecked data-check="'))
+
+    page.route("**/new?*", without)  # as it is while the service starts
+    page.goto("/new?model=machine-shaft&machine=press")
+    expect(page.locator(".picture svg").first).to_be_visible()
+
+
+def test_a_fault_in_a_folded_part_opens_it(visitor: Visitor) -> None:
+    page, name = visitor.page, "/base/parts/1/mechanism/slider_crank/crank"
+    _ready(page)
+    page.goto("/new?preset=two_cylinder_compressor")
+    field = page.locator(f'[id="{name}"]')
+    expect(field).to_be_hidden()
+    field.evaluate("field => { field.value = '3 kg'; field.dispatchEvent(new Event('input', { bubbles: true })); }")
+    expect(wrong(page, name)).to_contain_text("not a unit of this field")
+    expect(field).to_be_visible()
+    page.get_by_role("button", name="Add a part").click()
+    opened = page.locator("details.fold[open] > summary b")
+    expect(opened).to_have_text(["Part 2: slider crank", "Part 3: slider crank"])  # the one with the fault, the new one
+    page.locator('[id="/base/parts/2/mechanism"]').select_option("scotch_yoke")
+    expect(page.locator('[id="/base/parts/2/operation"]')).to_have_value("none")
+    page.get_by_role("button", name="Undo").click()
+    expect(page.locator('[id="/base/parts/2/operation"]')).to_have_value("gas")
