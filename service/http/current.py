@@ -13,7 +13,7 @@ from sprag_study.service.reading.reader import Choice
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from sprag_study.service.http.access import Grant
+    from sprag_study.service.http.grants import Grant
     from sprag_study.service.storage.database.session import Moment
 
 

@@ -16,8 +16,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from sprag_study.sentences import Sentence
 from sprag_study.service.actor import Actor, Role, act_as
 from sprag_study.service.faults import ParameterFault, shown
-from sprag_study.service.http.access import OPEN, Access, Grant, token_in
+from sprag_study.service.http.access import Access, token_in
 from sprag_study.service.http.current import knowing
+from sprag_study.service.http.grants import OPEN, Grant
 from sprag_study.service.http.problems import ApiError, problem_response
 from sprag_study.service.http.roles import LOOKING
 from sprag_study.service.http.web.problem_page import problem_page

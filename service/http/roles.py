@@ -17,7 +17,7 @@ from sprag_study.service.http.request_log import pattern_of
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from sprag_study.service.http.access import Grant
+    from sprag_study.service.http.grants import Grant
 
 _S: Final = "/api/v1/studies/{study_id}"
 _CASE: Final = _S + "/cases/{case}"

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Final
 
 from starlette.responses import Response, StreamingResponse
 
-from sprag_study.service.http.access import OPEN
 from sprag_study.service.http.current import current
+from sprag_study.service.http.grants import OPEN
 from sprag_study.service.http.problems import ApiError
 from sprag_study.service.json_text import to_bytes
 from sprag_study.service.storage.errors import StoreError

@@ -11,8 +11,8 @@ from fastapi import Depends, Request
 from starlette.requests import ClientDisconnect
 
 from sprag_study.service import languages
-from sprag_study.service.http.access import OPEN
 from sprag_study.service.http.context import study_with
+from sprag_study.service.http.grants import OPEN
 from sprag_study.service.http.requests import as_body_problems
 from sprag_study.service.http.respond import streamed
 from sprag_study.service.http.shares import turn
@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 
     from starlette.responses import Response
 
-    from sprag_study.service.http.access import Grant
     from sprag_study.service.http.computer import Computes
     from sprag_study.service.http.context import Context
+    from sprag_study.service.http.grants import Grant
     from sprag_study.service.http.shares import Shares
     from sprag_study.service.spec.document import ParsedSpec
     from sprag_study.service.spec.text import Body

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 from sprag_study.service.storage.errors import StoreError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from sprag_study.service.storage.store import Store
 
@@ -88,29 +88,26 @@ class Housekeeping(threading.Thread):
             self.join()
 
     def purge(self) -> None:
-        """Remove deleted studies; after each step, leave the database to others for as long as the step took."""
+        """Remove deleted studies."""
         self._store.studies.deleted.clear()
-        self._failed = False
-        try:
-            began = time.monotonic()
-            for _ in self._store.purging.steps():
-                if self._ending.wait(time.monotonic() - began):
-                    return
-                began = time.monotonic()
-        except StoreError as error:
-            self._failed = True
-            _LOG.warning("Deleted studies will be removed later: %s", error)
+        self._failed = not self._done(self._store.purging.steps, "Deleted studies will be removed later: %s")
 
     def add_keys(self) -> None:
-        """Give keys of their cases to studies that have none yet, in turns with other writers."""
+        """Give keys of their cases to studies that have none yet."""
+        self._done(self._store.reuse.key_steps, "Studies of before get the keys of their cases at the next start: %s")
+
+    def _done(self, steps: Callable[[], Iterable[object]], otherwise: str) -> bool:
+        """Whether nothing fails in these steps; after each, leave the database to others for as long as it took."""
         try:
             began = time.monotonic()
-            for _ in self._store.reuse.key_steps():
+            for _ in steps():
                 if self._ending.wait(time.monotonic() - began):
-                    return
+                    break
                 began = time.monotonic()
         except StoreError as error:
-            _LOG.warning("Studies of before get the keys of their cases at the next start: %s", error)
+            _LOG.warning(otherwise, error)
+            return False
+        return True
 
     def _do_also(self) -> None:
         for each in self._also:

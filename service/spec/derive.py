@@ -31,7 +31,7 @@ from sprag_study.worker.study import Axis, Combine, Study
 
 if TYPE_CHECKING:
     from sprag_study.service.spec.machine.machine import Machine
-    from sprag_study.service.spec.machine.registry import SpecPart
+    from sprag_study.service.spec.machine.part import SpecPart
     from sprag_study.worker.models import Parameter
 
 HELP: Final = (

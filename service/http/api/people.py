@@ -10,9 +10,9 @@ from starlette.responses import Response
 from sprag_study.service.answers import filled
 from sprag_study.service.answers import people as m
 from sprag_study.service.exports.audit import AUDIT_FORMATS, audit_pieces, entry_json
-from sprag_study.service.http.access import OPEN
 from sprag_study.service.http.api.document import files, format_query, next_page, problems
 from sprag_study.service.http.context import Ctx
+from sprag_study.service.http.grants import OPEN
 from sprag_study.service.http.people import Action, Actor, Since, Target, Until, quota_json, user_json
 from sprag_study.service.http.respond import choose_format, json_response, page_response, streamed
 from sprag_study.service.http.routers import api_router
@@ -22,7 +22,7 @@ from sprag_study.service.storage.people.people import Quota
 from sprag_study.worker.limits import MAX_PAGE_SIZE
 
 if TYPE_CHECKING:
-    from sprag_study.service.http.access import Grant
+    from sprag_study.service.http.grants import Grant
 
 router = api_router("administration")
 

@@ -12,7 +12,8 @@ from urllib.parse import quote, urlsplit
 
 from starlette.responses import RedirectResponse
 
-from sprag_study.service.http.access import COOKIE, Access, Grant
+from sprag_study.service.http.access import COOKIE, Access
+from sprag_study.service.http.grants import Grant
 from sprag_study.service.http.web.form.values import read_form
 from sprag_study.service.http.web.problem_page import wants_page
 from sprag_study.service.http.web.templates import page

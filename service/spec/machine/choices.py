@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 from sprag_study.service.languages import N_
 from sprag_study.service.spec.described import FIT, Described, Listed, below
+from sprag_study.service.spec.machine.part import Choice
 from sprag_study.service.spec.machine.shaft import SHAFT
 
 if TYPE_CHECKING:
@@ -18,14 +19,6 @@ PARTS: Final = {
     "mechanism": N_("the mechanism"),
     "operation": N_("how the resistance is given"),
 }
-
-
-class Choice(NamedTuple):
-    """One choice: its path in the base, the chosen value, and its meaning."""
-
-    path: str
-    text: str
-    meaning: str
 
 
 def drive_choices(study: Study, spec: Mapping[str, Any]) -> Iterator[Choice]:

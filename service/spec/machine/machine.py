@@ -13,7 +13,6 @@ from sprag_study.sentences import Sentence
 from sprag_study.service.reading.texts import did_you_mean
 
 if TYPE_CHECKING:
-    from sprag_study.service.spec.node import Node
     from sprag_study.worker.models import ClutchFit, Parameter
 
 
@@ -48,33 +47,3 @@ class Machine:
         known = tuple(self.parameters)
         hint = did_you_mean(path.removeprefix("base."), known)
         return Sentence("is not a numeric parameter of the base{hint}", hint=hint)
-
-
-def read_plain(base: Node, catalogue: tuple[Parameter, ...]) -> Machine:
-    """Read the machine of a model that is fully described by ``catalogue``: plain numbers, no lists, no choices."""
-    machine = Machine(parameters={entry.path: entry for entry in catalogue})
-    if _check_fields(base, "", machine):
-        read_numbers(base, machine)
-    return machine
-
-
-def read_numbers(base: Node, machine: Machine) -> None:
-    """Read the numbers of the machine's parameters into its values; faults are recorded."""
-    for path, entry in machine.parameters.items():
-        node = base.below(path)
-        number = node.number_or_default(entry)
-        # An open end of a range is not a number that could be stored.
-        if number is not None and (node.given or entry.accepts(number)):
-            machine.values[path] = number
-
-
-def _check_fields(node: Node, prefix: str, machine: Machine) -> bool:
-    """Whether a part of the base is an object; what parameters are not in, in it and below it, is recorded."""
-    rests = (path.removeprefix(prefix) for path in machine.parameters if path.startswith(prefix))
-    names = list(dict.fromkeys(rest.split(".")[0] for rest in rests))
-    if not node.has(names):
-        return False
-    for name in names:
-        if f"{prefix}{name}" not in machine.parameters and name in node:
-            _check_fields(node[name], f"{prefix}{name}.", machine)
-    return True

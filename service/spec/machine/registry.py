@@ -5,19 +5,18 @@ A model that is not registered is described by its catalogue of parameters: plai
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from sprag_study.sentences import Sentence
 from sprag_study.service.languages import N_
 from sprag_study.service.spec.axes.axes import varied_values
 from sprag_study.service.spec.derive import case_table, layout
-from sprag_study.service.spec.described import Field, Record
-from sprag_study.service.spec.machine.choices import Choice, drive_choices, shaft_choices
+from sprag_study.service.spec.described import Record
+from sprag_study.service.spec.machine.choices import drive_choices, shaft_choices
 from sprag_study.service.spec.machine.clutch import check_laws
 from sprag_study.service.spec.machine.drive import Drive, drive_record, read_drive
-from sprag_study.service.spec.machine.machine import read_plain
+from sprag_study.service.spec.machine.part import SpecPart, read_plain
 from sprag_study.service.spec.machine.shaft import SHAFT, check_shaft, read_shaft
 from sprag_study.service.spec.machine.start_states import check_starts
 from sprag_study.service.spec.run import RUN, read_run, refuse_run
@@ -27,55 +26,12 @@ from sprag_study.worker import models
 from sprag_study.worker.derived import distinct_values
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
-
     from sprag_study.service.spec.machine.machine import Machine
     from sprag_study.service.spec.node import Node
     from sprag_study.service.spec.report import Report
-    from sprag_study.worker.study import Axis, Combine, Study
+    from sprag_study.worker.study import Axis, Combine
 
     Axes = tuple[Axis, ...]
-
-
-_NO_RUN: Final = Record({}, "nothing: this model has no run")
-
-
-def _no_run(run: Node, *_: object) -> dict[str, Any]:
-    return refuse_run(run)
-
-
-def _nothing(*_: object) -> None:
-    """Check nothing, warn of nothing."""
-
-
-def _no_choices(*_: object) -> tuple[Choice, ...]:
-    return ()
-
-
-@dataclass(frozen=True, slots=True)
-class SpecPart:
-    """The part of one model; every function records faults in the report that it is given.
-
-    Attributes
-    ----------
-    read_base : reads `base`
-    check_base : checks a machine as a whole that could be read without faults
-    base, run : their descriptions
-    read_run : reads `run` as stored in a study, for a machine with its axes (None where they could not be read) and
-        their combination
-    check : checks what depends on both machine and axes
-    warn : warns of what is allowed but implausible
-    choices : the non-numeric fields of a study's machine; also takes the user's spec
-    """
-
-    read_base: Callable[[Node], Machine]
-    base: Callable[[], Field]
-    check_base: Callable[[Report, Machine], None] = _nothing
-    read_run: Callable[[Node, Axes | None, Combine], dict[str, Any]] = _no_run
-    run: Field = _NO_RUN
-    check: Callable[[Report, Machine, Axes, Combine], None] = _nothing
-    warn: Callable[[Report, Study], None] = _nothing
-    choices: Callable[[Study, Mapping[str, Any]], Iterable[Choice]] = _no_choices
 
 
 def _drive_run(run: Node, axes: Axes | None, combine: Combine) -> dict[str, Any]:

@@ -15,7 +15,8 @@ from sprag_study.service.languages import N_
 from sprag_study.service.reading.texts import did_you_mean
 from sprag_study.service.spec.described import Record, choice
 from sprag_study.service.spec.lists import refuse_mixed
-from sprag_study.service.spec.machine.machine import Machine, read_numbers
+from sprag_study.service.spec.machine.machine import Machine
+from sprag_study.service.spec.machine.part import read_numbers
 from sprag_study.service.spec.machine.shaft_check import check_machine
 from sprag_study.service.spec.machine.shaft_drive import BALANCE, BALANCE_SIDE, DRIVE, read_balance, read_drive
 from sprag_study.service.spec.machine.shaft_parts import (

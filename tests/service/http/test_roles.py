@@ -13,7 +13,7 @@ from starlette.requests import Request
 
 from sprag_study.service.actor import Role
 from sprag_study.service.http import access
-from sprag_study.service.http.access import Grant
+from sprag_study.service.http.grants import Grant
 from sprag_study.service.http.guard import OPEN_PATHS
 from sprag_study.service.http.handlers import install
 from sprag_study.service.http.roles import LOOKING, ROLES, require_role, role_needed

@@ -17,8 +17,8 @@ import pytest
 from starlette.requests import ClientDisconnect, Request
 
 from sprag_study.service.actor import Role
-from sprag_study.service.http.access import Grant
 from sprag_study.service.http.computer import Limits, ProcessComputer
+from sprag_study.service.http.grants import Grant
 from sprag_study.service.http.problems import ApiError
 from sprag_study.service.http.shares import Shares
 from sprag_study.service.http.work import Work
