@@ -82,27 +82,41 @@ def upgrade(url: str) -> tuple[str | None, str]:
         session.close()
 
 
+#: What tables are, by the statements of SQLite that made them: most databases have most of them alike.
+_KNOWN: dict[str, dict[str, object]] = {}
+
+
+def table(there: sa.Inspector, name: str) -> dict[str, object]:
+    """What a table is, in any order and without names of foreign keys."""
+    return {
+        "columns": sorted(str(sorted(column.items(), key=str)) for column in there.get_columns(name)),
+        "key": there.get_pk_constraint(name)["constrained_columns"],
+        "foreign": sorted(str({**key, "name": ""}) for key in there.get_foreign_keys(name)),
+        "indexes": sorted(map(str, there.get_indexes(name))),
+        "unique": sorted(map(str, there.get_unique_constraints(name))),
+        "checks": sorted(map(str, there.get_check_constraints(name))),
+    }
+
+
 def schema(session: Session) -> dict[str, object]:
-    """What the tables of a database are, in any order and without names of foreign keys."""
+    """What the tables of a database are."""
     with session.read() as connection:
         there = sa.inspect(connection)
-        unnamed = {
-            name: {
-                "columns": sorted(str(sorted(column.items(), key=str)) for column in there.get_columns(name)),
-                "key": there.get_pk_constraint(name)["constrained_columns"],
-                "foreign": sorted(str({**key, "name": ""}) for key in there.get_foreign_keys(name)),
-                "indexes": sorted(map(str, there.get_indexes(name))),
-                "unique": sorted(map(str, there.get_unique_constraints(name))),
-                "checks": sorted(map(str, there.get_check_constraints(name))),
-            }
-            for name in there.get_table_names()
-        }
-        rows = connection.exec_driver_sql("SELECT * FROM alembic_version").all()
         kinds: set[tuple[object, ...]] = set()
-        if not session.on_server:
+        if session.on_server:
+            tables = {name: table(there, name) for name in there.get_table_names()}
+        else:
             listed = connection.exec_driver_sql("SELECT name, wr, strict FROM pragma_table_list WHERE schema = 'main'")
             kinds = {tuple(row) for row in listed}
-        return {"tables": unnamed, "kinds": kinds, "revision": [tuple(row) for row in rows]}
+            statements: dict[str, str] = {}
+            for name, sql in connection.exec_driver_sql("SELECT tbl_name, sql FROM sqlite_master ORDER BY type, name"):
+                statements[name] = f"{statements.get(name, '')}{sql};"
+            tables = {}
+            for name in there.get_table_names():
+                made_by = statements[name]
+                tables[name] = _KNOWN[made_by] = _KNOWN.get(made_by) or table(there, name)
+        rows = connection.exec_driver_sql("SELECT * FROM alembic_version").all()
+        return {"tables": tables, "kinds": kinds, "revision": [tuple(row) for row in rows]}
 
 
 def schema_of(url: str) -> dict[str, object]:
