@@ -6,10 +6,13 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
 from benchmarks.faults.harness import free_port, kill_family
-from tests.conftest import ROOT
+from tests.conftest import ROOT, Finished
 from tests.worker.executors.certificates import CERTIFICATES, SECTION, SETTINGS, require_openssl
 
 _COMMANDS = re.findall(r"```sh\n(.*?)```", SECTION, re.DOTALL)[2]
@@ -33,7 +36,7 @@ def run(command: str, folder: Path) -> bytes:
     return out
 
 
-def test_the_commands_for_a_cluster_give_the_rows_of_the_pool(tmp_path: Path) -> None:
+def test_the_commands_for_a_cluster_give_the_rows_of_a_run_here(tmp_path: Path, sprag: Callable[..., Finished]) -> None:
     require_openssl()
     place = f"127.0.0.1:{free_port()}"
 
@@ -53,11 +56,13 @@ def test_the_commands_for_a_cluster_give_the_rows_of_the_pool(tmp_path: Path) ->
         for process in started:
             kill_family(process)
             process.communicate()
-    assert by_cluster == run(f"sprag run {_SPEC}", tmp_path)
+    assert by_cluster.decode() == sprag("run", _SPEC).out
 
 
-def test_a_run_on_a_cluster_without_certificates_is_refused(tmp_path: Path) -> None:
-    process = shell(f"SPRAG_EXECUTOR=dask://head.example:8786 sprag run {_SPEC}", tmp_path)
-    _, said = process.communicate()
-    assert process.returncode == 3
-    assert b"the scheduler head.example:8786 is spoken to by TLS, which needs certificates" in said
+def test_a_run_on_a_cluster_without_certificates_is_refused(
+    sprag: Callable[..., Finished], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SPRAG_EXECUTOR", "dask://head.example:8786")
+    refused = sprag("run", _SPEC)
+    assert refused.code == 3
+    assert "the scheduler head.example:8786 is spoken to by TLS, which needs certificates" in refused.err
