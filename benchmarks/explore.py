@@ -23,8 +23,7 @@ from sprag_study.service.json_text import to_bytes
 from sprag_study.service.reading.reader import Choice
 from sprag_study.service.results.explore import ExploreQuery, explore, explored_json, plan_of
 from sprag_study.service.storage.store import Store
-from sprag_study.service.views.column_files import ColumnFiles
-from sprag_study.service.views.columns import Columns
+from sprag_study.service.views.columns import ColumnFiles, Columns
 from sprag_study.service.views.library import Library
 
 

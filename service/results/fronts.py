@@ -42,8 +42,6 @@ if TYPE_CHECKING:
 
 #: Designs that are answered unless more are asked for.
 DESIGNS: Final = 2000
-#: Designs that are answered at most.
-MOST_DESIGNS: Final = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)

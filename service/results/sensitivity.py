@@ -26,23 +26,21 @@ from sprag_study.service.reading.reader import Phrase, plural
 from sprag_study.service.results.curves import Fetch
 from sprag_study.service.results.regimes import counted, kind_columns, kinds_of, left_out
 from sprag_study.service.results.selection import axis_name, numeric_results
-from sprag_study.service.results.sensitivity_design import (
-    factorial_table,
-    going_together,
-    is_factorial,
-    is_sample,
-    scattered,
-    why_no_shares,
-)
 from sprag_study.service.results.sensitivity_indices import (
     LEAST_CASES,
     Indices,
     Pair,
+    factorial_table,
+    going_together,
     grid_indices,
+    is_factorial,
+    is_sample,
     morris_indices,
     nothing,
     saltelli_indices,
     sample_indices,
+    scattered,
+    why_no_shares,
 )
 from sprag_study.service.results.tolerances.batch import nominal_only
 from sprag_study.service.spec.draws.unit import LEVELS, cases_of

@@ -166,5 +166,5 @@ def test_home_and_cache_are_where_the_unit_may_write(root: Path) -> None:
     found = environment(root)
     assert Path(found["HOME"]).is_dir()
     assert Path(found["XDG_CACHE_HOME"]).is_dir()
-    code = "from sprag_study.service.views.column_files import default_folder; print(default_folder())"
+    code = "from sprag_study.service.views.columns import default_folder; print(default_folder())"
     assert Path(confined(sys.executable, "-c", code, cwd=root).strip()).is_relative_to(root)

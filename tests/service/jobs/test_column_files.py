@@ -16,8 +16,7 @@ from sprag_study.service.http.read_ahead import read_ahead
 from sprag_study.service.storage.rows.columns import RowColumns
 from sprag_study.service.views import columns as module
 from sprag_study.service.views import explore
-from sprag_study.service.views.column_files import ColumnFiles
-from sprag_study.service.views.columns import Columns
+from sprag_study.service.views.columns import ColumnFiles, Columns
 from sprag_study.worker.pool.child_pool import JobStoppedError
 from sprag_study.worker.states import StudyState
 from tests.service.conftest import Service

@@ -16,7 +16,7 @@ from sprag_study.service.figures.pictures import draw_sensitivity
 from sprag_study.service.reading.quantities import Units
 from sprag_study.service.reading.reader import CODES, Reading
 from sprag_study.service.results.sensitivity import Sensitivity
-from sprag_study.service.results.sensitivity_design import is_sample
+from sprag_study.service.results.sensitivity_indices import is_sample
 from sprag_study.service.views.sensitivity import indices_csv
 from tests.service.results.test_sensitivity import API, SPEED, effects, ranges
 

@@ -317,7 +317,7 @@ def test_designs_are_ranked_once_for_all_that_shows_them(service: Service, monke
         ranked.append(exact)
         return designs_of(*args, exact=exact)
 
-    monkeypatch.setattr("sprag_study.service.views.kept.designs_of", rank)
+    monkeypatch.setattr("sprag_study.service.views.library.designs_of", rank)
     study_id = search(service, rounds=1)
     for page in ("/rows", "/rows?sort=rank", "/rows/search.svg", "/rows/file"):
         assert service.http.get(f"/studies/{study_id}{page}").status_code == 200
