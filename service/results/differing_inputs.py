@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from sprag_study.service.exports.inputs import inputs as every_input
 from sprag_study.service.languages import N_
@@ -89,6 +89,10 @@ class _Cell:
     full: str = ""
 
 
+#: Inputs of one study by their paths.
+_Cells: TypeAlias = "Iterator[tuple[str, _Cell]]"
+
+
 def differing_inputs(compared: Sequence[ReadStudy]) -> list[DifferingInput]:
     """What the studies are, their machines with what varies, what they search or refine, their runs."""
     shared = frozenset[str].intersection(*(frozenset(one.spec) for one in compared))
@@ -125,7 +129,7 @@ def _rows(cells: Sequence[Mapping[str, _Cell]]) -> Iterator[DifferingInput]:
         yield DifferingInput(path, " / ".join(captions), texts)
 
 
-def _general(one: ReadStudy) -> Iterator[tuple[str, _Cell]]:
+def _general(one: ReadStudy) -> _Cells:
     """The model, what the study is and how several axes go together, and which axis is swept."""
     study, reading = one.study, one.reading
     yield "model", _Cell(_("Model"), study.model, model_title(study.model))
@@ -139,7 +143,7 @@ def _general(one: ReadStudy) -> Iterator[tuple[str, _Cell]]:
         yield "sweep", _Cell(_("Swept"), (study.sweep, ways), f"{reading.caption(study.sweep)}: {text}")
 
 
-def _machine(one: ReadStudy) -> Iterator[tuple[str, _Cell]]:
+def _machine(one: ReadStudy) -> _Cells:
     """What varies, the other numbers, and the choices of the machine, each with its tolerance."""
     study, reading = one.study, one.reading
     axes = {axis.paths: axis for axis in study.axes} if study.plan is None else {}
@@ -193,7 +197,7 @@ def _text(item: Input, reading: Reading) -> str:
     return reading.quantity(item.value, item.unit, _DIGITS)
 
 
-def _asked(one: ReadStudy) -> Iterator[tuple[str, _Cell]]:
+def _asked(one: ReadStudy) -> _Cells:
     """What is searched, refined or calibrated."""
     study, reading = one.study, one.reading
     if study.kind == GOAL:
@@ -216,7 +220,7 @@ def _asked(one: ReadStudy) -> Iterator[tuple[str, _Cell]]:
         yield "calibrate.measured", _Cell(_("Measured values"), csv, number(values))
 
 
-def _settings(one: ReadStudy, shared: Collection[str]) -> Iterator[tuple[str, _Cell]]:
+def _settings(one: ReadStudy, shared: Collection[str]) -> _Cells:
     """How studies of the same kind choose their cases."""
     for part, record in _SETTINGS.items():
         for name, field in record.fields.items() if part in shared else ():
@@ -226,13 +230,13 @@ def _settings(one: ReadStudy, shared: Collection[str]) -> Iterator[tuple[str, _C
                 yield f"{part}.{name}", _Cell(_(field.label), text, text)
 
 
-def _run(one: ReadStudy) -> Iterator[tuple[str, _Cell]]:
+def _run(one: ReadStudy) -> _Cells:
     """The settings of the run."""
     for label, text, item in run_settings(one.study, one.spec, one.reading):
         yield f"run.{item.path}", _Cell(label, str(item.value), text)
 
 
-def _further(one: ReadStudy, shared: Collection[str]) -> Iterator[tuple[str, _Cell]]:
+def _further(one: ReadStudy, shared: Collection[str]) -> _Cells:
     """What else is written; how drives are drawn only where all studies draw some."""
     names = names_in_files([*one.study.base, *one.study.axis_paths])
     for name, value in one.spec.items():

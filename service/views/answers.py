@@ -100,7 +100,7 @@ class AnswersView(StudyView[AnswersQuestion, AnswersChoice, StudyAnswers]):
         """By the cases of the study."""
         return study.cases <= study_view.FEW // 2
 
-    def find(self, library: Library, study_id: str, chosen: AnswersChoice, *, drawn: bool = False) -> StudyAnswers:
+    def find(self, library: Library, study_id: str, chosen: AnswersChoice) -> StudyAnswers:
         """The answers."""
         return answers_of(library, study_id, chosen.query, chosen.point)
 

@@ -40,7 +40,7 @@ class CalibrationView(StudyView[CalibrationQuestion, None, Calibration]):
         """Nothing; FaultError where the study is no calibration."""
         plan_of(study)
 
-    def find(self, library: Library, study_id: str, chosen: None, *, drawn: bool = False) -> Calibration:
+    def find(self, library: Library, study_id: str, chosen: None) -> Calibration:
         """The calibration."""
         return library.calibrations.of(study_id)
 

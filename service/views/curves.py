@@ -78,7 +78,6 @@ class CurvesView(StudyView[CurvesQuestion, CurveQuery, Curves]):
     about = CURVES
     content = "Curves, as JSON, a table or a picture."
     shape = m.Curves
-    drawn_differs = True
 
     def choose(self, study: Study, question: CurvesQuestion) -> CurveQuery:
         """The query, with the axes held at their usual value if that is wanted."""
@@ -96,9 +95,13 @@ class CurvesView(StudyView[CurvesQuestion, CurveQuery, Curves]):
         """By the numbers of the curves."""
         return drawn_numbers(study, chosen) <= study_view.FEW
 
-    def find(self, library: Library, study_id: str, chosen: CurveQuery, *, drawn: bool = False) -> Curves:
-        """The curves; those that are drawn have the points of refined curves between their cases."""
-        return (drawn_curves if drawn else stored_curves)(library.store, study_id, chosen)
+    def find(self, library: Library, study_id: str, chosen: CurveQuery) -> Curves:
+        """The curves."""
+        return stored_curves(library.store, study_id, chosen)
+
+    def find_drawn(self, library: Library, study_id: str, chosen: CurveQuery) -> Curves:
+        """The curves with the other motions of cases that have several."""
+        return drawn_curves(library.store, study_id, chosen)
 
     def json(self, answer: CurvesAnswer) -> dict[str, Any]:
         """The curves as JSON data."""
@@ -176,7 +179,7 @@ class MapView(StudyView[MapQuestion, tuple[CurveQuery, bool], Map]):
         """By the numbers of the map."""
         return drawn_numbers(study, chosen[0]) <= study_view.FEW
 
-    def find(self, library: Library, study_id: str, chosen: tuple[CurveQuery, bool], *, drawn: bool = False) -> Map:
+    def find(self, library: Library, study_id: str, chosen: tuple[CurveQuery, bool]) -> Map:
         """The map."""
         return stored_map(library.store, study_id, chosen[0])
 

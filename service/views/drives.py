@@ -106,7 +106,7 @@ class RibbonView(_OfDrives, StudyView[RibbonQuestion, RibbonQuery, Ribbon]):
         numeric_results(models.study_results(study), "y", chosen.y)
         places_of(study, chosen.asked)
 
-    def find(self, library: Library, study_id: str, chosen: RibbonQuery, *, drawn: bool = False) -> Ribbon:
+    def find(self, library: Library, study_id: str, chosen: RibbonQuery) -> Ribbon:
         """The ribbons; SelectionError as of `ribbon`."""
         study = library.store.studies.study(study_id)
         fetch = partial(library.store.rows.for_cases, study_id)
@@ -147,7 +147,7 @@ class YieldView(_OfDrives, StudyView[YieldQuestion, YieldQuery, Yield]):
         read_conditions(models.study_results(study), chosen.conditions)
         places_of(study, chosen.asked)
 
-    def find(self, library: Library, study_id: str, chosen: YieldQuery, *, drawn: bool = False) -> Yield:
+    def find(self, library: Library, study_id: str, chosen: YieldQuery) -> Yield:
         """The yields; SelectionError as of `yields`."""
         study = library.store.studies.study(study_id)
         fetch = partial(library.store.rows.for_cases, study_id)

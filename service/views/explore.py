@@ -89,7 +89,7 @@ class ExploreView(StudyView[ExploreQuestion, Chosen, Explored]):
         """By the cases of the study and the rows that are wanted."""
         return study.cases <= study_view.FEW and chosen[0].limit <= study_view.FEW // 10
 
-    def find(self, library: Library, study_id: str, chosen: Chosen, *, drawn: bool = False) -> Explored:
+    def find(self, library: Library, study_id: str, chosen: Chosen) -> Explored:
         """The selected cases."""
         return explored(library, study_id, chosen[0])
 

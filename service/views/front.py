@@ -38,7 +38,7 @@ class FrontView(StudyView[FrontQuestion, FrontQuestion, Designs]):
         """By the cases of the study: ranking takes a time that grows faster than their number."""
         return study.cases <= study_view.FEW // 10
 
-    def find(self, library: Library, study_id: str, chosen: FrontQuestion, *, drawn: bool = False) -> Designs:
+    def find(self, library: Library, study_id: str, chosen: FrontQuestion) -> Designs:
         """The ranked designs."""
         return library.fronts.of(study_id, exact=chosen.exact)
 

@@ -64,9 +64,7 @@ class SensitivityView(StudyView[SensitivityQuestion, tuple[str, ...], list[Sensi
         infos = models.study_results(study)
         return {"y": Offered(drawn_results(study)[:MOST_RESULTS], groups=named(numeric_names(infos)))}
 
-    def find(
-        self, library: Library, study_id: str, chosen: tuple[str, ...], *, drawn: bool = False
-    ) -> list[Sensitivity]:
+    def find(self, library: Library, study_id: str, chosen: tuple[str, ...]) -> list[Sensitivity]:
         """The sensitivities; raises SelectionError and StudyNotFoundError."""
         store = library.store
         fetch = partial(store.rows.for_cases, study_id)

@@ -62,15 +62,17 @@ class StudyView(ABC, Generic[Question, Chosen, Result]):
         That of its JSON.
     file : str
         The last part of the name of its file, where that is not its name.
-    drawn_differs : bool
-        Whether what is found to be drawn is more than the numbers.
     """
 
     about: ClassVar[ViewInfo]
     content: ClassVar[str]
     shape: ClassVar[Any]
     file: ClassVar[str] = ""
-    drawn_differs: ClassVar[bool] = False
+
+    @property
+    def drawn_differs(self) -> bool:
+        """Whether a picture shows more than the numbers."""
+        return type(self).find_drawn is not StudyView.find_drawn
 
     def has(self, study: Study) -> bool:
         """Whether a study has it."""
@@ -92,8 +94,12 @@ class StudyView(ABC, Generic[Question, Chosen, Result]):
         return False
 
     @abstractmethod
-    def find(self, library: Library, study_id: str, chosen: Chosen, *, drawn: bool = False) -> Result:
-        """Find it in the rows of the study, as numbers or to be ``drawn``."""
+    def find(self, library: Library, study_id: str, chosen: Chosen) -> Result:
+        """Find it in the rows of the study."""
+
+    def find_drawn(self, library: Library, study_id: str, chosen: Chosen) -> Result:
+        """Find what a picture shows, where that is more than the numbers."""
+        return self.find(library, study_id, chosen)
 
     @abstractmethod
     def json(self, answer: StudyAnswer[Chosen, Result]) -> Mapping[str, Any]:
@@ -126,7 +132,8 @@ def found(
     library: Library, study_id: str, view: StudyView[Any, Chosen, Result], chosen: Chosen, *, drawn: bool = False
 ) -> StudyAnswer[Chosen, Result]:
     """Find the view of a study, as numbers or to be ``drawn``."""
-    return StudyAnswer(library, study_id, chosen, view.find(library, study_id, chosen, drawn=drawn))
+    find = view.find_drawn if drawn else view.find
+    return StudyAnswer(library, study_id, chosen, find(library, study_id, chosen))
 
 
 def study_file(
