@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from sprag_study.service.faults import Fault
 from sprag_study.service.http.context import Context
-from sprag_study.service.http.web.form.entries import range_of
+from sprag_study.service.http.web.form.walk import Filled
 from sprag_study.service.reading.catalogue import unit_of
 from sprag_study.service.reading.reader import Reading
 from sprag_study.service.spec.kinds.registry import without_cases
@@ -24,7 +24,7 @@ def calibration_spec(spec: Mapping[str, Any], values: Mapping[str, str]) -> dict
     """The spec of a calibration of the machine of ``spec``, with the fields of the page."""
     kept = without_cases(spec)
     unknown = [
-        {"path": path, **range_of({name: values.get(f"{name}{row}", "") for name in ("from", "to")}, "")}
+        {"path": path, **Filled({f"/{name}": values.get(f"{name}{row}", "") for name in ("from", "to")}).ranged()}
         for row in range(ROWS)
         if (path := values.get(f"path{row}", "").strip())
     ]

@@ -9,7 +9,7 @@ from typing import Any, Final
 from sprag_study.sentences import Place, WarningText
 from sprag_study.service.reading.numbers import assumption, in_language, settle, settled, with_point
 from sprag_study.service.reading.printed import could_be_values, keyboard
-from sprag_study.service.reading.together import split_list, with_last_unit, with_unit_of_range
+from sprag_study.service.reading.together import split_list, with_last_unit
 
 Values = dict[str, str]
 Faults = dict[str, list[str]]
@@ -70,33 +70,9 @@ def list_text(values: str | Sequence[Any]) -> str:
     return "; ".join(split_list(values) if isinstance(values, str) else map(text_of, values))
 
 
-def range_of(values: Mapping[str, str], pointer: str, names: Sequence[str] = ("from", "to")) -> dict[str, Any]:
-    """The ends of a range, and its step where it has one, by name; a unit at the end holds for the bare numbers."""
-    written = [in_language(values.get(f"{pointer}{name}", "").strip()) for name in names]
-    texts = dict(zip(names, settled(written), strict=True))
-    if "step" in texts:
-        texts["from"], texts["to"], texts["step"] = with_unit_of_range(texts["from"], texts["to"], texts["step"])
-    else:
-        texts["from"], texts["to"] = with_last_unit([texts["from"], texts["to"]])
-    return {name: plain(text) for name, text in texts.items()}
-
-
 def names_of(text: str) -> list[str]:
     """Names, such as paths and results, separated by semicolons, commas or blanks."""
     return [name for name in re.split(r"[;,\s]+", text) if name]
-
-
-def paths_of(values: Mapping[str, str], pointer: str) -> str | list[str] | None:
-    """The path or the tied paths of what varies at ``pointer``; None where there is none."""
-    paths = [values.get(f"{pointer}/path", "").strip(), *names_of(values.get(f"{pointer}/tied", ""))]
-    paths = [path for path in paths if path]
-    return (paths[0] if len(paths) == 1 else paths) if paths else None
-
-
-def path_values(pointer: str, path: str | list[str]) -> Values:
-    """The form's values for a path or tied paths at ``pointer``."""
-    paths = path if isinstance(path, list) else [path]
-    return {f"{pointer}/path": paths[0], f"{pointer}/tied": ", ".join(paths[1:])}
 
 
 def text_of(value: Any) -> str:

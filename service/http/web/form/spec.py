@@ -13,8 +13,6 @@ from sprag_study.service.http.web.form.entries import (
     list_of,
     list_text,
     names_of,
-    path_values,
-    paths_of,
     plain,
     text_of,
     unclear,
@@ -81,11 +79,22 @@ def is_search(values: Mapping[str, str]) -> bool:
     return values.get("asks") == "goal"
 
 
+def _paths(form: Filled) -> dict[str, Any]:
+    """The path or the tied paths of what varies; None where there is none."""
+    paths = list(filter(None, (form.text("path"), *names_of(form.text("tied")))))
+    return {"path": paths if len(paths) > 1 else next(iter(paths), None)}
+
+
+def _path_fields(item: Mapping[str, Any]) -> Values:
+    first, *others = item["path"] if isinstance(item["path"], list) else [item["path"]]
+    return {"path": first, "tied": ", ".join(others)}
+
+
 def _listed(way: str) -> Cell:
     """Values that a list under the name of the way gives: its ends, and their number or step."""
     names = WAYS[way]
     return Cell(
-        (way,), names, lambda form: {way: form.ranged(names)},
+        (way,), names, lambda form: {way: list(form.ranged(names).values())},
         lambda item: {name: text_of(end) for name, end in zip(names, item[way], strict=True)},
     )  # fmt: skip
 
@@ -226,12 +235,9 @@ class _Axes:
         return PARTS["axes"].show({"axes": axes}, form)
 
 
-_PATHS: Final = Cell(
-    ("path",), ("path", "tied"), lambda form: {"path": paths_of(form.values, form.at)},
-    lambda item: {name.removeprefix("/"): text for name, text in path_values("", item["path"]).items()},
-)  # fmt: skip
+_PATHS: Final = Cell(("path",), ("path", "tied"), _paths, _path_fields)
 _RANGE: Final = Cell(
-    ("from", "to"), ("from", "to"), lambda form: dict(zip(("from", "to"), form.ranged(), strict=True)),
+    ("from", "to"), ("from", "to"), Filled.ranged,
     lambda item: {name: text_of(item[name]) for name in ("from", "to")},
 )  # fmt: skip
 _VALUES: Final = Cell(

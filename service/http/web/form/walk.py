@@ -18,12 +18,11 @@ from sprag_study.service.http.web.form.entries import (
     entries_of,
     items_of,
     plain,
-    range_of,
     text_of,
 )
 from sprag_study.service.http.web.form.machine import BASE
 from sprag_study.service.reading.numbers import in_language, settled
-from sprag_study.service.reading.together import with_last_unit
+from sprag_study.service.reading.together import with_last_unit, with_unit_of_range
 from sprag_study.service.spec.described import Described
 from sprag_study.worker.models import form as data
 
@@ -64,12 +63,13 @@ class Filled:
         self.doubts += doubtful(items, entries, [f"{self.at}/{name}"] * len(items), self.text("path"))
         return entries
 
-    def ranged(self, names: Sequence[str] = ("from", "to")) -> list[Any]:
-        """The entries of fields that are the ends of a range, as of `range_of`."""
+    def ranged(self, names: Sequence[str] = ("from", "to")) -> dict[str, Any]:
+        """The ends of a range, and its step or count, by name; a unit at the end holds for the bare numbers."""
         items = settled([in_language(self.text(name)) for name in names])
-        entries = list(range_of(self.values, f"{self.at}/", names).values())
+        together = with_unit_of_range(*items) if "step" in names else (*with_last_unit(items[:2]), *items[2:])
+        entries = list(map(plain, together))
         self.doubts += doubtful(items, entries, [f"{self.at}/{name}" for name in names], self.text("path"))
-        return entries
+        return dict(zip(names, entries, strict=True))
 
     def show(self, texts: Mapping[str, str]) -> None:
         """Set the texts of fields."""
