@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import json
 import pickle
 import re
@@ -13,7 +12,6 @@ from typing import get_args
 
 import pytest
 
-from docs.catalogues import of_code
 from sprag_study.sentences import (
     Amount,
     Clause,
@@ -30,7 +28,7 @@ from sprag_study.sentences import (
 from sprag_study.service.cli.console import warning_lines
 from sprag_study.service.faults import FaultError, WarningCode
 from sprag_study.service.http.handlers import as_api_error
-from sprag_study.service.languages import gettext, language
+from sprag_study.service.languages import language
 from sprag_study.service.languages.recorded import MANY_STUDIES, NOT_IN_TIME
 from sprag_study.service.reading.quantities import Units
 from sprag_study.service.reading.reader import Phrase, Reading, shown, told
@@ -38,7 +36,6 @@ from sprag_study.service.storage.errors import StudyNotFoundError
 from sprag_study.service.storage.stored_sentences import read_warnings, write_warnings
 from sprag_study.worker.ports import StoreError
 from sprag_study.worker.states import StudyEvent, StudyState, TransitionError
-from tests.conftest import ROOT
 from tests.service import warning_samples
 
 DRIVE = Reading("vibration-drive", Units({"N*m": "N*mm", "m": "mm", "rad": "deg"}))
@@ -147,28 +144,6 @@ def test_a_command_says_a_warning_with_code_names() -> None:
     with language("uk"):
         (line,) = warning_lines([wide])
     assert line.startswith("застереження: /axes/0 (excitation.amplitude_x): 1,6 м — це більше за 0,1 м;")
-
-
-def texts_of_sentences() -> list[str]:
-    """The texts of sentences in the code, which are said in other languages."""
-    found = []
-    for package in ("engine", "worker", "service"):
-        for file in (ROOT / package).rglob("*.py"):
-            source = file.read_text(encoding="utf-8")
-            if "Sentence(" in source:
-                calls = [
-                    node
-                    for node in ast.walk(ast.parse(source))
-                    if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Sentence"
-                ]
-                found += [key.text for call in calls for key, _many in of_code(ast.unparse(call), str(file))]
-    return sorted({*found})
-
-
-@pytest.mark.parametrize("text", texts_of_sentences())
-def test_every_sentence_is_in_the_catalogue(text: str) -> None:
-    with language("uk"):
-        assert gettext(text) != text or not re.search(r"[a-z]{3,}", re.sub(r"\{\w+\}", "", text))
 
 
 @pytest.mark.parametrize(
