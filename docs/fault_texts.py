@@ -14,7 +14,7 @@ _SERVICE: Final = Path(__file__).resolve().parents[1] / "service"
 #: Functions that take the message of a fault, and its place among their arguments.
 _MESSAGE: Final = {
     **dict.fromkeys(("fault", "Fault", "ParameterFault", "refused", "parameter_error"), 2),
-    **dict.fromkeys(("refuse", "FinishError", "FormulaError", "QuantityError", "TimingError"), 1),
+    **dict.fromkeys(("refuse", "refuse_each", "FormulaError", "QuantityError", "TimingError"), 1),
     "mistake": 0,
     "check_size": 0,  # what there is too much of
 }

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sprag_study.sentences import Amount
-from sprag_study.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
+from sprag_study.service.figures.figure import Figure, Line, Panel, Quantity, colour_at
 from sprag_study.service.reading.reader import Phrase, joined, plural
 from sprag_study.service.reading.wording import number
 
@@ -26,7 +26,7 @@ def basin_figure(made: Basin, paths: tuple[str, str], units: tuple[str, str]) ->
         inside = made.members == regime
         if not inside.any():
             continue
-        colour = _FAILED if regime < 0 else PALETTE[regime % len(PALETTE)]
+        colour = _FAILED if regime < 0 else colour_at(regime)
         lines.append(
             Line(_label(made, regime), across[inside], along[inside], colour, max(regime, 0), str(regime), joined=False)
         )

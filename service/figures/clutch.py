@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag_study.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
+from sprag_study.service.figures.figure import Figure, Line, Panel, Quantity, colour_at
 from sprag_study.service.reading.reader import Phrase
 from sprag_study.service.reading.units import QuantityError, parse_quantity
 from sprag_study.worker import models
@@ -35,7 +35,7 @@ def clutch_figure(study: Study, spec: Mapping[str, Any], largest: float) -> Figu
         if not law or not end > 0.0:
             continue
         u = np.linspace(0.0, end, _POINTS)
-        colour = PALETTE[len(lines) // 2 % len(PALETTE)]
+        colour = colour_at(len(lines) // 2)
         lines.append(
             Line(Phrase("{clutch}: law", clutch=name), u, models.clutch_torque(law, limit or end, u), colour, key=name)
         )

@@ -254,6 +254,11 @@ class Figure:
         return [line for panel in self.panels for line in panel.lines if line.listed]
 
 
+def colour_at(place: int) -> str:
+    """The colour of a line at a place among few; those of the palette begin again."""
+    return PALETTE[place % len(PALETTE)]
+
+
 def line_colours(count: int) -> list[str]:
     """Colours: maximally different for a few lines, graded in order for many."""
     if count <= len(PALETTE):

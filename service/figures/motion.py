@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag_study.service.figures.figure import NEUTRAL, PALETTE, Figure, Line, Panel, Quantity
+from sprag_study.service.figures.figure import NEUTRAL, PALETTE, Figure, Line, Panel, Quantity, colour_at
 from sprag_study.service.reading.reader import Phrase, joined, part_label
 from sprag_study.service.reading.wording import words
 
@@ -39,7 +39,7 @@ def motion_figure(
                 part_label(label),
                 _along(made.times, angle=angle),
                 made.values[:, made.names.index(name)],
-                PALETTE[place % len(PALETTE)],
+                colour_at(place),
                 place,
                 key=f"{panel.title} {label}" if angle else panel.title,
                 heading="" if angle else Phrase(words(panel.title)),
@@ -112,7 +112,7 @@ def phase_figure(made: Trajectory, shown: Presentation) -> Figure:
             part_label(label),
             made.values[::step, made.names.index(angle)],
             made.values[::step, made.names.index(speed)],
-            PALETTE[index % len(PALETTE)],
+            colour_at(index),
             index,
             key=label,
         )

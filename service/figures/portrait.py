@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag_study.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
+from sprag_study.service.figures.figure import Figure, Line, Panel, Quantity, colour_at
 from sprag_study.service.reading.reader import Phrase, part_label, plural, term
 from sprag_study.worker import models
 
@@ -50,12 +50,12 @@ def _plane(made: Portrait, shown: Presentation) -> Iterator[Line]:
         if made.order:
             x, y = _column(made.orbit, angle), _column(made.orbit, speed)
             kept = np.append(np.arange(0, x.size - 1, step), x.size - 1)
-            yield Line(part_label(label), x[kept], y[kept], PALETTE[index % len(PALETTE)], key=label)
+            yield Line(part_label(label), x[kept], y[kept], colour_at(index), key=label)
         yield Line(
             part_label(label),
             _column(made.strobes, angle),
             _column(made.strobes, speed),
-            PALETTE[index % len(PALETTE)],
+            colour_at(index),
             index,
             key=label,
             listed=not made.order,
@@ -77,7 +77,7 @@ def _along(made: Portrait, lines: list[tuple[str, str]]) -> Iterator[Line]:
             x = np.tile([periods[0], periods[-1], periods[-1]], levels.size)
             y = np.stack([levels, levels, np.full(levels.size, np.nan)], axis=1).reshape(-1)
             yield Line(Phrase("{part}: level of the orbit", part=part_label(label)), x, y, _RING, 1, listed=False)
-        colour = PALETTE[index % len(PALETTE)]
+        colour = colour_at(index)
         yield Line(
             part_label(label),
             periods,

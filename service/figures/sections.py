@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag_study.sentences import Name
-from sprag_study.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
+from sprag_study.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity, colour_at
 from sprag_study.service.reading.catalogue import unit_of
 from sprag_study.service.reading.reader import Phrase, joined, part_label, term
 from sprag_study.service.reading.wording import number
@@ -70,7 +70,7 @@ def _planes(made: CaseSections, study: Study) -> Iterator[Line]:
     values = made.values[0][~np.isnan(made.values[0, :, 0])]
     for index, (angle, speed, label) in enumerate(models.presentation_of(study).phases(made.names)):
         x, y = values[:, made.names.index(angle)], values[:, made.names.index(speed)]
-        yield Line(part_label(label), x, y, PALETTE[index % len(PALETTE)], index, key=label, joined=False)
+        yield Line(part_label(label), x, y, colour_at(index), index, key=label, joined=False)
 
 
 def _heading(asked: Sampling) -> Phrase:

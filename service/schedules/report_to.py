@@ -89,8 +89,9 @@ def require_deliverable(wanted: ReportTo, delivery: Delivery) -> None:
     for number, address in enumerate(wanted.email):
         if not mail_allowed(address, delivery):
             allowed = Sentence("addresses of {domains} (SPRAG_MAIL_DOMAINS)", domains=", ".join(delivery.domains))
-            domain = "has a domain to which no reports go"
-            node["report_email"][number].refuse("invalid-choice", domain, allowed=allowed)
+            node["report_email"][number].refuse(
+                "invalid-choice", "has a domain to which no reports go", allowed=allowed
+            )
     if wanted.webhook is not None and origin_of(wanted.webhook) not in delivery.origins:
         allowed = Sentence("none, until the administrator allows origins (SPRAG_WEBHOOK_ORIGINS)")
         if delivery.origins:

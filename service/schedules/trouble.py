@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sprag_study.sentences import Sentence
+from sprag_study.service.languages import N_
 from sprag_study.service.reading.texts import did_you_mean
 from sprag_study.worker import models
 
@@ -31,7 +32,7 @@ def read_trouble_flags(node: Node, model: str | None) -> tuple[str, ...] | None:
         allowed = Sentence("a list of {names}", names=names) if known else Sentence("an empty list")
         node.refuse("wrong-type", "must be a list of flags", allowed=allowed)
         return None
-    allowed_name, flags = names if known else "no flag", list[str]()
+    allowed_name, flags = names if known else N_("no flag"), list[str]()
     for item in node.parts():
         flag = item.value
         if node.report.full:

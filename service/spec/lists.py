@@ -67,5 +67,5 @@ def read_list_text(node: Node, unit: str, about: str = "") -> Sequence[Node] | N
         node.refuse("invalid-text", "could be one value or several",
                     allowed="values separated by semicolons, or a list of them")  # fmt: skip
         return None
-    items = [Node(node.report, node.pointer, item) for item in with_last_unit(settled(typed))]
+    items = [node.holding(item) for item in with_last_unit(settled(typed))]
     return read_list(items, unit, about)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
@@ -97,7 +97,11 @@ class Node:
 
     def otherwise(self, default: object) -> Node:
         """The same place with ``default``, where nothing is given."""
-        return self if self.given else Node(self.report, self.pointer, default)
+        return self if self.given else self.holding(default)
+
+    def holding(self, value: object) -> Node:
+        """The same place with another value."""
+        return Node(self.report, self.pointer, value)
 
     def refuse(
         self, code: Code, message: str, value: object = _ITSELF, *, allowed: str | None = None, unit: str | None = None
@@ -105,6 +109,12 @@ class Node:
         """Record a fault of this value, as `Report.fault`; ``value`` is what it shows instead of it."""
         shown = self.value if value is _ITSELF else value
         self.report.fault(self.pointer, code, message, shown, allowed=allowed, unit=unit)
+
+    def refuse_each(self, names: Iterable[str], message: str, code: Code = "conflict") -> None:
+        """Record a fault of each of the fields ``names`` that is given."""
+        for name in names:
+            if name in self:
+                self[name].refuse(code, message)
 
     def mistake(self, message: str, *, allowed: str | None = None) -> None:
         """Record that something else is given, or, where nothing is, that it is required."""
@@ -133,6 +143,11 @@ class Node:
         """The double nearest to `exact`."""
         number = self.exact(parameter)
         return None if number is None else to_float(number)
+
+    def number_in(self, parameters: Sequence[Parameter]) -> float | None:
+        """As `number`, in the range of every one of ``parameters``, which have one unit."""
+        numbers = [self.number(parameter) for parameter in parameters]
+        return None if None in numbers else numbers[0]
 
     def number_or_default(self, parameter: Parameter) -> float | None:
         """As `number`; where nothing is given, the default of the parameter, or a fault where it has none."""

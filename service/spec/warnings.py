@@ -39,8 +39,7 @@ _SLOW: Final = 0.1
 
 def warn_vibration_drive(report: Report, study: Study) -> None:
     """Warn of implausible values of a vibration drive anywhere on the axes of ``study``."""
-    for path in dict.fromkeys((*study.base, *study.axis_paths)):
-        _plausible(report, study, path)
+    _plausible(report, study)
     runs = study.cases * count_of(study.run)
     if has_starts(study.run) and runs > _MANY_RUNS:
         report.warn(
@@ -67,8 +66,7 @@ def warn_vibration_drive(report: Report, study: Study) -> None:
 
 def warn_machine_shaft(report: Report, study: Study) -> None:
     """Warn of implausible values of a machine shaft anywhere on the axes of ``study``."""
-    for path in dict.fromkeys((*study.base, *study.axis_paths)):
-        _plausible(report, study, path)
+    _plausible(report, study)
     structure = study.structure or {}
     operation_found = structure.get("balance_side") == "operation"
     for prefix, part in _parts(study):
@@ -232,20 +230,20 @@ def _values(study: Study, path: str) -> NDArray[np.float64]:
     return distinct_values(study, path) if path in study.derive else varied_values(path, study.axes, study.base)
 
 
-def _plausible(report: Report, study: Study, path: str) -> None:
-    parameter = parameter_of(study, path)
-    if parameter is None or parameter.mistake is None:
-        return
-    values = _values(study, path)
-    largest = float(values[np.abs(values).argmax()])
-    if abs(largest) > parameter.plausible:
-        text = Sentence(
-            "{value} is more than {limit}; {question}",
-            value=Amount(largest, parameter.unit, 6),
-            limit=Amount(parameter.plausible, parameter.unit, 4),
-            question=parameter.mistake,
-        )
-        report.warn("implausible-value", _place(study, path), text)
+def _plausible(report: Report, study: Study) -> None:
+    """Warn of values beyond what is plausible."""
+    for path in dict.fromkeys((*study.base, *study.axis_paths)):
+        parameter = parameter_of(study, path)
+        if parameter is None or parameter.mistake is None:
+            continue
+        values = _values(study, path)
+        largest = float(values[np.abs(values).argmax()])
+        if abs(largest) > parameter.plausible:
+            limits = {
+                "value": Amount(largest, parameter.unit, 6), "limit": Amount(parameter.plausible, parameter.unit, 4),
+            }  # fmt: skip
+            text = Sentence("{value} is more than {limit}; {question}", **limits, question=parameter.mistake)
+            report.warn("implausible-value", _place(study, path), text)
 
 
 def _place(study: Study, path: str) -> Place:

@@ -62,9 +62,7 @@ def read_distribution(item: Node) -> SampleDistribution | None:
     parameters = [item.machine.parameters[path] for path in paths]
     unit = parameters[0].unit
     if "values" in item:
-        for field in ("nominal", "plus_minus", "distribution"):
-            if field in item:
-                item[field].refuse("conflict", "cannot be combined with `values`")
+        item.refuse_each(("nominal", "plus_minus", "distribution"), "cannot be combined with `values`")
         values = read_measured(item["values"], parameters)
         return None if values is None else SampleDistribution(paths, Distribution("values", values=tuple(values)))
     if refuse_mixed([item["nominal"], item["plus_minus"]], unit):
@@ -92,8 +90,7 @@ def read_distribution(item: Node) -> SampleDistribution | None:
 def _read_nominal(node: Node, parameters: list[Parameter]) -> float | None:
     """The value in the middle, by default that of the base; None, with a fault recorded, where there is none."""
     if node.given:
-        read = [node.number(parameter) for parameter in parameters]
-        return None if None in read else read[0]
+        return node.number_in(parameters)
     values = {node.machine.values.get(parameter.path) for parameter in parameters}
     if len(values) == 1 and None not in values:
         return values.pop()

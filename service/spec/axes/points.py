@@ -58,5 +58,5 @@ def _read_heading(node: Node, cell: str, place: int) -> Column | None:
         node.refuse("invalid-path", "has a heading that names no parameter", cell,
                     allowed="a path, its unit in brackets")  # fmt: skip
         return None
-    named = read_paths(Node(node.report, node.pointer, heading[0]))
+    named = read_paths(node.holding(heading[0]))
     return None if named is None else Column(*heading, place)

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag_study.service.spec.node import Node
-    from sprag_study.worker.models import Parameter
 
 _METHOD_HELP: Final = (
     "latin_hypercube and sobol fill the ranges evenly, random points are independent; saltelli is the design for Sobol "
@@ -155,7 +154,7 @@ def _read_range(item: Node) -> SampleRange | None:
     ends = [item["from"], item["to"]]
     if paths is None or refuse_mixed(ends, unit):
         return None
-    low, high = (_in_all(end, parameters) for end in ends)
+    low, high = (end.number_in(parameters) for end in ends)
     if low is None or high is None:
         return None
     if low == high:
@@ -166,12 +165,6 @@ def _read_range(item: Node) -> SampleRange | None:
                     [end.value for end in ends], unit=unit)  # fmt: skip
         return None
     return None if scale is None else SampleRange(paths, low, high, scale)
-
-
-def _in_all(end: Node, parameters: Sequence[Parameter]) -> float | None:
-    """An end of a range (SI) that all ``parameters`` can have."""
-    numbers = [end.number(parameter) for parameter in parameters]
-    return None if None in numbers else numbers[-1]
 
 
 def draw(

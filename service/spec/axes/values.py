@@ -101,7 +101,7 @@ def _written_range(node: Node, parameter: Parameter, written: TypedRange) -> Pla
         )
         return None
     third = written.step if written.count is None else written.count
-    own = Node(node.report, node.pointer, [written.first, written.last, third])
+    own = node.holding([written.first, written.last, third])
     return (plan_range if written.count is None else plan_linspace)(own, parameter)
 
 

@@ -78,7 +78,7 @@ def read_measured(node: Node, parameters: Sequence[Parameter]) -> list[float] | 
     """
     unit, about = parameters[0].unit, parameters[0].path
     text = isinstance(node.value, str)
-    listed = _MEASURED.read(Node(node.report, node.pointer, split_list(node.value)) if text else node)
+    listed = _MEASURED.read(node.holding(split_list(node.value)) if text else node)
     if listed is None:
         return None
     items = read_list_text(node, unit, about) if text else read_list(listed, unit, about)

@@ -82,7 +82,7 @@ def _read_unknown(calibrate: Node) -> tuple[Unknown, ...] | None:
     for item in CALIBRATE.items(calibrate, "unknown"):
         if _UNKNOWN.read(item):
             path = item["path"]
-            paths = read_path_of(Node(path.report, path.pointer, _expanded(path)))
+            paths = read_path_of(path.holding(_expanded(path)))
             ends = None if paths is None else read_ends(item, paths, (item["from"], item["to"]))
             unknown += [] if paths is None or ends is None else [Unknown(paths, *ends)]
     if node.sound:

@@ -28,13 +28,11 @@ def read_ends(node: Node, paths: Sequence[str], ends: Sequence[Node]) -> tuple[f
     unit = parameters[0].unit
     if refuse_mixed(ends, unit):
         return None
-    read: list[float] = []
-    for end in ends:
-        numbers = [end.number(parameter) for parameter in parameters]
-        if numbers[0] is None or None in numbers:
-            return None
-        read.append(numbers[0])
-    low, high = sorted(read)
+    read = [end.number_in(parameters) for end in ends]
+    known = [end for end in read if end is not None]
+    if len(known) < len(read):
+        return None
+    low, high = sorted(known)
     if low == high:
         node.refuse("invalid-range", "begins where it ends", quantity_text(low, unit), allowed="two values")
         return None

@@ -20,7 +20,7 @@ from sprag_study.service.spec.kinds.fields import (
     read_result,
     read_value,
 )
-from sprag_study.service.spec.kinds.robust import QUANTILE, check_drives, read_quantile, refuse_beside_yield
+from sprag_study.service.spec.kinds.robust import QUANTILE, check_drives, read_quantile
 from sprag_study.service.spec.lists import refuse_mixed
 from sprag_study.service.spec.schema.quantity import QUANTITY
 from sprag_study.service.spec.shares import in_percent
@@ -241,7 +241,7 @@ def _read_best(items: Sequence[Node]) -> list[dict[str, Any]]:
 
 def _read_yield_goal(item: Node) -> list[dict[str, Any]]:
     """The goal of a large yield; nothing, and faults recorded, where it is invalid."""
-    refuse_beside_yield(item, ("result", "quantile"))
+    item.refuse_each(("result", "quantile"), "cannot be combined with `yield`")
     if item["max"].otherwise(True).value is not True:
         item["max"].refuse("conflict", "a yield is to be large", allowed="true")
         return []
@@ -260,7 +260,7 @@ def _read_constraint(item: Node, *, robust: bool = False) -> dict[str, Any] | No
     if not (_CONSTRAINT if robust else _LIMIT).read(item):
         return None
     if robust and "yield" in item:
-        refuse_beside_yield(item, ("result", "quantile", "is", "at_most", "within"))
+        item.refuse_each(("result", "quantile", "is", "at_most", "within"), "cannot be combined with `yield`")
         conditions, least = _read_conditions(item["yield"]), item["at_least"].share(0.0, 1.0)
         return None if least is None or not conditions else {"yield": conditions, "at_least": least}
     info, kind, quantile = read_result(item["result"]), item.one_of(_KINDS), read_quantile(item)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from sprag_study.service.spec.node import Node
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
     from sprag_study.service.spec.report import Report
 
@@ -28,13 +28,6 @@ def read_quantile(item: Node) -> dict[str, float] | None:
         return {}
     share = item["quantile"].share(0.0, 1.0)
     return None if share is None else {"quantile": share}
-
-
-def refuse_beside_yield(item: Node, names: Iterable[str]) -> None:
-    """Record each of the fields ``names`` that is given beside `yield`."""
-    for name in names:
-        if name in item:
-            item[name].refuse("conflict", "cannot be combined with `yield`")
 
 
 def check_drives(

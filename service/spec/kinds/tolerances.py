@@ -109,9 +109,7 @@ def _read_spread(spec: Node, axes: Sequence[Axis] | None) -> Spread | None:
     """
     node = spec["tolerances"]
     if not node.given:
-        for name in SPREAD:
-            if name in spec:
-                spec[name].refuse("not-used", "has no effect without `tolerances`")
+        spec.refuse_each(SPREAD, "has no effect without `tolerances`", "not-used")
         return None
     settings = {name: field.read(spec) for name, field in DRAWS.items()}
     items = _TOLERANCES.read(node)
@@ -242,9 +240,7 @@ def _nominal(item: Node, path: str, axes: Sequence[Axis]) -> _Nominal:
 
 def _measured(item: Node, name: str, paths: tuple[str, ...], nominal: list[_Nominal]) -> list[_Drawn]:
     """A tolerance given by measured values."""
-    for field in ("plus_minus", "distribution"):
-        if field in item:
-            item[field].refuse("conflict", "cannot be combined with `values`")
+    item.refuse_each(("plus_minus", "distribution"), "cannot be combined with `values`")
     varied = [path for path, one in zip(paths, nominal, strict=True) if one.varies]
     if varied:
         message = Sentence("gives {path} its values, but an axis varies it", path=varied[0])
@@ -273,7 +269,7 @@ def _around(item: Node, kind: str, name: str, paths: tuple[str, ...], nominal: l
     """A tolerance around the nominal values."""
     node = item["plus_minus"]
     if isinstance(node.value, str) and node.value.strip().startswith("±"):  # as pages print it
-        node = Node(node.report, node.pointer, node.value.strip()[1:].lstrip())
+        node = node.holding(node.value.strip()[1:].lstrip())
     if _mixed(node, nominal):
         return []
     units = list(dict.fromkeys(one.parameter.unit for one in nominal))

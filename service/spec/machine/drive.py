@@ -158,7 +158,7 @@ def _read_section(node: Node, section: Record, prefix: str, machine: Drive) -> N
         node.refuse("required", Sentence("is required, with at least {names}", names=names), allowed="an object")
         return
     # A null in the list is an invalid pendulum, not a missing section.
-    if not section.read(node if node.value is not None else Node(node.report, node.pointer, "null")):
+    if not section.read(node if node.value is not None else node.holding("null")):
         return
     for name, entry in parameters.items():
         number = node[name].number_or_default(entry)
