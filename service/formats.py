@@ -18,6 +18,9 @@ MEDIA_TYPES: Final[dict[Format, str]] = {
 #: Heads of the columns of CSV: names, with the unit where it is not SI, or names with every unit.
 Header = Literal["names", "units"]
 HEADERS: Final[tuple[Header, ...]] = get_args(Header)
+#: Decimal signs of CSV: a point, or a comma, with semicolons between the columns and a byte order mark.
+Decimal = Literal["point", "comma"]
+DECIMALS: Final[tuple[Decimal, ...]] = get_args(Decimal)
 #: Attribute of the variables of a NetCDF file with the name that they have everywhere else, such as shaft.speed.mean.
 NAME_ATTRIBUTE: Final = "sprag_name"
 #: Formats of a study's report.

@@ -14,9 +14,10 @@ from sprag_study.service.client.errors import RefusedError
 from sprag_study.service.client.events import StudyEvent
 from sprag_study.service.client.synchronous.connection import Connection
 from sprag_study.service.client.wire import plain_body
+from sprag_study.service.exports.decimal_commas import with_commas
 from sprag_study.service.faults import FaultError, choice_of, parameter_error
 from sprag_study.service.figures.pictures import PICTURES
-from sprag_study.service.formats import FORMATS, HEADERS
+from sprag_study.service.formats import DECIMALS, FORMATS, HEADERS
 from sprag_study.service.http.problems import PROBLEM_TYPES, problem_json
 from sprag_study.service.http.views import case_detail, whole_detail
 from sprag_study.service.jobs import checks
@@ -142,6 +143,15 @@ class Here(Connection, ABC):
 
     def _content(self, study_id: str, part: str, query: Query) -> Iterable[bytes]:
         """What lies at an address, as JSON unless the query has another ``format``."""
+        given = dict(query)
+        decimal = choice_of("decimal", given.pop("decimal", "point"), DECIMALS)
+        if decimal == "point":
+            return self._answer(study_id, part, query)
+        if given.get("format") != "csv":
+            raise parameter_error("decimal", "not-used", "only CSV has it", decimal, "in csv")
+        return with_commas(self._answer(study_id, part, list(given.items())))
+
+    def _answer(self, study_id: str, part: str, query: Query) -> Iterable[bytes]:
         given, library = dict(query), self.library
         form = given.get("format", "json")
         study = library.store.studies.study(study_id)

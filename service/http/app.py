@@ -42,6 +42,7 @@ from sprag_study.service.http.api.document import build_openapi
 from sprag_study.service.http.compression import Compression
 from sprag_study.service.http.computer import Computes, Limits, ProcessComputer
 from sprag_study.service.http.context import Context
+from sprag_study.service.http.decimals import InDecimals
 from sprag_study.service.http.drain import Drain
 from sprag_study.service.http.guard import Guard
 from sprag_study.service.http.language import InLanguage
@@ -198,7 +199,7 @@ class Application(FastAPI):
 
     def build_middleware_stack(self) -> ASGIApp:
         """The framework's layers inside the guard."""
-        guarded = Guard(Noted(Compression(super().build_middleware_stack())), self._settings, self._access)
+        guarded = Guard(Noted(Compression(InDecimals(super().build_middleware_stack()))), self._settings, self._access)
         self.drain = Drain(RequestLog(guarded, self._metrics, self._access.attempts.address_of))
         return Prefixed(InLanguage(self.drain), self._settings.url_prefix)
 

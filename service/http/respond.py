@@ -16,7 +16,7 @@ from werkzeug.datastructures import MIMEAccept
 from werkzeug.http import parse_accept_header, parse_etags
 
 from sprag_study import service
-from sprag_study.service.faults import choice_of, shown
+from sprag_study.service.faults import choice_of, parameter_error, shown
 from sprag_study.service.http.problems import ApiError
 from sprag_study.service.json_text import to_bytes
 from sprag_study.worker.models import source_hash
@@ -113,8 +113,16 @@ def choose_format(request: Request, wanted: str | None, media_types: Mapping[For
     """The format of the answer: ``wanted`` (the query's ``format``), else the one preferred by Accept, else the first.
 
     A type that Accept names precedes one that it only allows (``image/*``, ``*/*``). Raises ApiError when the query
-    names an unknown format, and when Accept allows none.
+    names an unknown format, or has decimal commas for another one than CSV, and when Accept allows none.
     """
+    form = _preferred(request, wanted, media_types)
+    decimal = request.query_params.get("decimal", "point")
+    if decimal != "point" and form != "csv":
+        raise parameter_error("decimal", "not-used", "only CSV has it", decimal, "in csv")
+    return form
+
+
+def _preferred(request: Request, wanted: str | None, media_types: Mapping[Form, str]) -> Form:
     if wanted is not None:
         return choice_of("format", wanted, media_types)
     header = ",".join(request.headers.getlist("accept"))

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 
     from sprag_study.service.answers.results import Case, CaseDetail, RegimeRow
     from sprag_study.service.client.queries import Held, Value
-    from sprag_study.service.formats import Header
+    from sprag_study.service.client.wire import Query
+    from sprag_study.service.formats import Decimal, Header
 
 
 class StudyTables(StudyPart):
@@ -107,13 +108,17 @@ class StudyTables(StudyPart):
         header: Header | None = None,
         language: str | None = None,
         point: Value | None = None,
+        decimal: Decimal | None = None,
     ) -> bytes:
         """All rows in a format of `sprag_study.service.exports`, or the report as "html" or "pdf".
 
-        ``header`` of CSV: "names", with units that are not SI, or "units", with every unit. ``language`` of a report:
-        a code such as "uk"; English without it. ``point`` of a report: its working point, such as "0.3 N*m".
+        ``header`` of CSV: "names", with units that are not SI, or "units", with every unit. ``decimal`` of CSV:
+        "point", or "comma" for spreadsheets of many countries, with semicolons between columns and a byte order mark.
+        ``language`` of a report: a code such as "uk"; English without it. ``point`` of a report: its working point,
+        such as "0.3 N*m".
         """
-        with self._pieces(form, units, header, language, point) as pieces:
+        asked = {"units": units, "header": header, "language": language, "point": point, "decimal": decimal}
+        with self._pieces(form, query_of(asked)) as pieces:
             return b"".join(list(pieces))
 
     def export(
@@ -125,23 +130,22 @@ class StudyTables(StudyPart):
         header: Header | None = None,
         language: str | None = None,
         point: Value | None = None,
+        decimal: Decimal | None = None,
     ) -> Path:
         """Write all rows, or a report, to a file; its ending determines the format unless ``form`` is given.
 
-        ``header``, ``language`` and ``point`` as for `download`. A file that is there already stays until all of the
-        new one has arrived.
+        ``header``, ``language``, ``point`` and ``decimal`` as for `download`. A file that is there already
+        stays until all of the new one has arrived.
         """
         path = Path(file)
         # A refusal is raised before anything is written.
-        with self._pieces(form or form_of(path), units, header, language, point) as pieces:
+        asked = {"units": units, "header": header, "language": language, "point": point, "decimal": decimal}
+        with self._pieces(form or form_of(path), query_of(asked)) as pieces:
             _written(pieces, path)
         return path
 
     @contextmanager
-    def _pieces(
-        self, form: str, units: str | None, header: Header | None, language: str | None, point: Value | None
-    ) -> Iterator[Iterator[bytes]]:
-        query = query_of({"units": units, "header": header, "language": language, "point": point})
+    def _pieces(self, form: str, query: Query) -> Iterator[Iterator[bytes]]:
         if form in ("html", "pdf"):
             opened = self._client.pieces(f"{self._path}/report", [*query, ("format", form)])
         else:

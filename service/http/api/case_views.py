@@ -11,6 +11,7 @@ from sprag_study.service.http.api.document import CASE_PROBLEMS, files, format_q
 from sprag_study.service.http.api.drawn_format import DrawnFormat
 from sprag_study.service.http.asked import asking
 from sprag_study.service.http.context import CaseNumber, StartNumber, StudyId
+from sprag_study.service.http.decimals import DECIMAL
 from sprag_study.service.http.drawing import DRAWN_FORMATS, TABLE_FORMATS, picture, table
 from sprag_study.service.http.respond import choose_format
 from sprag_study.service.http.routers import api_router
@@ -49,6 +50,7 @@ def _add(view: CaseView[Any, Any, Any]) -> None:
         f"/{{case:case}}/{about.name}",
         name=f"get_{about.name}",
         description=about.summary,
+        dependencies=[DECIMAL],
         response_model=view.shape,
         responses=responses,
     )(asking(answer, about.question, without))

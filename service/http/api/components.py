@@ -12,6 +12,7 @@ from sprag_study.service.answers import filled
 from sprag_study.service.exports.components import COMPONENT_FORMATS, components_csv
 from sprag_study.service.http.api.document import BODY_PROBLEMS, DELETES, body, files, format_query, problems
 from sprag_study.service.http.context import ID_PATTERN, Ctx
+from sprag_study.service.http.decimals import DECIMAL
 from sprag_study.service.http.requests import IfMatch, Received, editions
 from sprag_study.service.http.respond import choose_format, json_response
 from sprag_study.service.http.routers import api_router
@@ -38,6 +39,7 @@ def entry(record: ComponentRecord) -> m.ComponentEntry:
 
 @router.get(
     "/components",
+    dependencies=[DECIMAL],
     response_model=m.ComponentList,
     responses={
         **files("The components as JSON or as a CSV file.", COMPONENT_FORMATS.values()),

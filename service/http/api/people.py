@@ -12,6 +12,7 @@ from sprag_study.service.answers import people as m
 from sprag_study.service.exports.audit import AUDIT_FORMATS, audit_pieces, entry_json
 from sprag_study.service.http.api.document import files, format_query, next_page, problems
 from sprag_study.service.http.context import Ctx
+from sprag_study.service.http.decimals import DECIMAL
 from sprag_study.service.http.grants import OPEN
 from sprag_study.service.http.people import Action, Actor, Since, Target, Until, quota_json, user_json
 from sprag_study.service.http.respond import choose_format, json_response, page_response, streamed
@@ -46,6 +47,7 @@ def list_users(context: Ctx) -> Response:
 
 @router.get(
     "/audit",
+    dependencies=[DECIMAL],
     response_model=m.AuditPage,
     responses={
         200: files("A page of the log, or all of it as a file.", AUDIT_FORMATS.values())[200] | next_page()[200],

@@ -18,6 +18,7 @@ from sprag_study.service.http.api.drawn_format import language_query
 from sprag_study.service.http.api.study_views import PROBLEMS
 from sprag_study.service.http.asked import asking, one_of
 from sprag_study.service.http.context import StudyId
+from sprag_study.service.http.decimals import DECIMAL
 from sprag_study.service.http.drawing import Drawing, attached, conditional, tag_of
 from sprag_study.service.http.kept_files import asks_for_part, file_response
 from sprag_study.service.http.reading import ReportChoice, TableUnits
@@ -50,6 +51,7 @@ _AT_ONCE: Final = 100_000
 
 @router.get(
     "/results",
+    dependencies=[DECIMAL],
     response_class=Response,
     responses={
         **files("All finished cases, in the requested format.", formats.MEDIA_TYPES.values()),

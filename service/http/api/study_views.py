@@ -11,6 +11,7 @@ from sprag_study.service.http.api.document import files, not_modified, problems
 from sprag_study.service.http.api.drawn_format import DrawnFormat
 from sprag_study.service.http.asked import asking
 from sprag_study.service.http.context import StudyId
+from sprag_study.service.http.decimals import DECIMAL
 from sprag_study.service.http.drawing import DRAWN_FORMATS, Drawing, attached, conditional, picture
 from sprag_study.service.http.reading import FileChoice
 from sprag_study.service.http.routers import api_router
@@ -49,6 +50,7 @@ def _add(view: StudyView[Any, Any, Any]) -> None:
         f"/{name}",
         name=f"get_{_NAMES.get(name, name)}",
         description=view.about.summary,
+        dependencies=[DECIMAL],
         response_model=view.shape,
         responses={**files(view.content, DRAWN_FORMATS.values()), **problems(*PROBLEMS), **not_modified()},
     )(asking(answer, view.about.question))

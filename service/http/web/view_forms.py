@@ -142,6 +142,9 @@ def files_of(address: str, asked: Asked, further: Sequence[tuple[str, str]] = ()
         (f"csv, {gettext(word)}", [("format", "csv"), (one.alias, choice)])
         for one in tables
         for choice, word in zip(one.setting.choices, one.setting.words or one.setting.choices, strict=True)
-    ] or [("csv", [("format", "csv")])]
+    ] or [
+        ("csv", [("format", "csv")]),
+        (gettext("csv with decimal commas"), [("format", "csv"), ("decimal", "comma")]),
+    ]
     others = [(form, [("format", form)]) for form in ("json", *(PICTURES if asked.about.pictures else ()))]
     return [(name, f"{address}?{urlencode([*query, *own])}") for name, own in (*csv, *others)]
