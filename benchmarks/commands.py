@@ -16,6 +16,7 @@ COMMANDS = {
     "sprag --version": ["-m", "sprag_study.service.cli", "--version"],
     "sprag --help": ["-m", "sprag_study.service.cli", "--help"],
     "sprag run --help": ["-m", "sprag_study.service.cli", "run", "--help"],
+    "sprag show curves --help": ["-m", "sprag_study.service.cli", "show", "curves", "--help"],
 }
 
 
@@ -41,7 +42,7 @@ def main() -> None:
     for name, seconds in measured.items():
         median = statistics.median(seconds)
         ratio, spread = median / python, f"{min(seconds):.2f} to {max(seconds):.2f}"
-        print(f"{name:18} {median:5.2f} s of processor time ({spread}), {ratio:4.1f} x")
+        print(f"{name:24} {median:5.2f} s of processor time ({spread}), {ratio:4.1f} x")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""How fast a database moves from SQLite to PostgreSQL and back (`sprag db move`), against a COPY of the same rows.
+"""How fast a database moves from SQLite to PostgreSQL and back (`sprag admin db move`), against a COPY of its rows.
 
     python -m benchmarks.moving [--rows 100000]
 

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import typer
 
-from sprag_study.service.cli.app import app
+from sprag_study.service.cli.app import command_line
 from sprag_study.service.cli.console import ExitCode
 
 FOLDER: Final = Path(__file__).parent / "man"
@@ -20,7 +20,7 @@ VERSION: Final = tomllib.loads((FOLDER.parents[1] / "pyproject.toml").read_text(
 
 def pages() -> dict[str, str]:
     """The text of every page by the name of its file: sprag.1, sprag-run.1, sprag-db-upgrade.1, ..."""
-    root = typer.main.get_command(app)
+    root = command_line()
     return {f"{name}.1": "\n".join(lines) + "\n" for name, lines in _pages(root, None, "sprag")}
 
 

@@ -13,13 +13,12 @@ import sys
 from collections.abc import Container, Iterable, Iterator
 from pathlib import Path
 
-import typer
 from fastapi.routing import APIRoute
 
 from docs import manual
 from sprag_study.engine.formulas.expressions import MAX_LENGTH
 from sprag_study.engine.vibration_drive.engagements import MAX_PERIODS
-from sprag_study.service.cli.app import app
+from sprag_study.service.cli.app import command_line
 from sprag_study.service.cli.console import ExitCode
 from sprag_study.service.cli.settings import VARIABLES
 from sprag_study.service.fault_meanings import KIND_MEANINGS, MEANINGS, WARNING_MEANINGS
@@ -37,7 +36,7 @@ Row = Iterable[str]
 
 def commands(command: object | None = None, name: str = "") -> Iterator[Row]:
     """Every command with the first paragraph of its help."""
-    command = command or typer.main.get_command(app)
+    command = command or command_line()
     if name and (not hasattr(command, "commands") or getattr(command, "invoke_without_command", False)):
         yield f"`sprag {name}`", _sentence(command.help)  # type: ignore[attr-defined]
     for key, inner in getattr(command, "commands", {}).items():

@@ -26,6 +26,9 @@ NAME_ATTRIBUTE: Final = "sprag_name"
 #: Formats of a study's report.
 ReportFormat = Literal["html", "pdf"]
 REPORT_FORMATS: Final[tuple[ReportFormat, ...]] = get_args(ReportFormat)
+#: Formats of pictures.
+Picture = Literal["svg", "png", "pdf"]
+PICTURES: Final[tuple[Picture, ...]] = get_args(Picture)
 #: File endings of each format; the first one is used for writing.
 SUFFIXES: Final[dict[Format, tuple[str, ...]]] = {
     "csv": ("csv",),

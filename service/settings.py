@@ -103,7 +103,7 @@ class Settings(DeliverySettings):
     )
     user_role: Literal["", "viewer", "designer", "administrator"] = Field(
         default="",
-        description="role of users whom the proxy names and `sprag user` does not list; empty: they are refused",
+        description="role of users whom the proxy names and `sprag admin user` does not list; empty: they are refused",
     )
     user_cases: int = Field(
         default=0, ge=0, le=2**63 - 1, description="cases of one user that may wait at the same time; 0: no limit"
@@ -318,7 +318,7 @@ class Settings(DeliverySettings):
         if not self.loopback and self.token is None and not self.user_header and not stored:
             raise UnsafeSettingsError(
                 f"The host {self.host} can be reached from other machines, so the service needs a token: "
-                f"`sprag token create` makes one, or set {ENV_PREFIX}TOKEN."
+                f"`sprag admin token create` makes one, or set {ENV_PREFIX}TOKEN."
             )
 
 

@@ -144,6 +144,7 @@ def sprag(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.delenv("SPRAG_DEBUG", raising=False)
     monkeypatch.delenv("SPRAG_SERVER", raising=False)
+    monkeypatch.setenv("XDG_CONFIG_HOME", os.devnull)  # no login of whoever runs the tests
 
     def run(*arguments: object) -> Finished:
         capsys.readouterr()

@@ -6,10 +6,10 @@ import json
 import os
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from functools import cache
-from typing import Annotated, cast
+from typing import Annotated, Any, Final, cast
 
 import typer
 from typer.core import TyperGroup
@@ -17,36 +17,10 @@ from typer.main import get_command
 
 from sprag_study.service import languages
 from sprag_study.service.actor import Door, act_as, of_machine
-from sprag_study.service.cli import (
-    calibrations,
-    case_views,
-    cases,
-    catalogue,
-    compare,
-    components,
-    database,
-    demo,
-    doctor,
-    explore,
-    extend,
-    fit,
-    local,
-    processes,
-    regimes,
-    remote,
-    saved_views,
-    schedule,
-    settings,
-    settle,
-    single_case,
-    studies,
-    study_views,
-    token,
-    user,
-    workers,
-)
+from sprag_study.service.cli.common import CURRENT, Common, wants_json
 from sprag_study.service.cli.completion import COMPLETION_VARIABLE
 from sprag_study.service.cli.console import (
+    BugError,
     CommandFailureError,
     ExitCode,
     TroubleError,
@@ -55,8 +29,9 @@ from sprag_study.service.cli.console import (
     write_text,
     wrong_option,
 )
-from sprag_study.service.cli.groups import Groups
+from sprag_study.service.cli.groups import Groups, LazyCommands, Word, common_first
 from sprag_study.service.cli.language import OPTION, VARIABLE, chosen, code_of, refusal, translate
+from sprag_study.service.cli.old_words import forwarded
 from sprag_study.service.extras import command_for
 from sprag_study.service.faults import FaultError, Kind
 from sprag_study.service.languages import N_, _
@@ -106,92 +81,87 @@ def _every_command(
             envvar=VARIABLE,
             metavar="CODE",
             callback=_known_language,
-            help="Language of help and messages, such as uk; default: that of the system. JSON is always English.",
+            show_envvar=False,
+            help="Language of help and messages, such as uk; default: that of the system.",
         ),
     ] = None,
+    server: Annotated[
+        str | None,
+        typer.Option("--server", metavar="URL", help="Address of the service; default: SPRAG_SERVER, or the login."),
+    ] = None,
+    token: Annotated[
+        str | None,
+        typer.Option("--token", metavar="SECRET", help="Token of the service; default: SPRAG_TOKEN, or the login."),
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Answer in JSON, in English; failures as JSON on standard error.")
+    ] = False,
 ) -> None:
-    """Options before the name of a command; typer shows the application's own help instead of this text."""
+    """Options of every command; typer shows the application's own help instead of this text."""
+    CURRENT.set(Common(server, token, as_json))
 
 
-_COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
-    N_("Run here"): {
-        "run": local.run,
-        "validate": local.validate,
-        "preview": local.preview,
-        "settle": settle.settle,
-        "calibrate": calibrations.calibrate,
-        **case_views.COMMANDS,
-        "regimes": regimes.regimes,
-        "fit": fit.fit,
-        "presets": local.presets,
-    },
-    N_("Run a service"): {
-        "demo": demo.demo,
-        "serve": processes.serve,
-        "worker": processes.worker,
-        "doctor": doctor.doctor,
-        "settings": settings.settings,
-    },
-    N_("Use a running service"): {
-        "submit": remote.submit,
-        "extend": extend.extend,
-        "longer": extend.longer,
-        "narrow": extend.narrow,
-        "select": explore.select,
-        "watch": remote.watch,
-        "list": studies.list_studies,
-        "edit": studies.edit,
-        "delete": studies.delete,
-        "restore": studies.restore,
-        "pause": remote.pause,
-        "resume": remote.resume,
-        "cancel": remote.cancel,
-        "retry": remote.retry,
-        "prioritize": remote.prioritize,
-        "case": single_case.case,
-        "cases": cases.cases,
-        "compare": compare.compare,
-        "export": remote.export,
-        "models": catalogue.models,
-        "rounds": remote.rounds,
-        "workers": workers.workers,
-    },
-    N_("See results"): study_views.COMMANDS,
-}
-for _title, _commands in _COMMANDS.items():
-    for _name, _command in _commands.items():
-        app.command(_name, rich_help_panel=_title)(_command)
-app.add_typer(components.app, name="component", rich_help_panel="Use a running service")
-app.add_typer(schedule.app, name="schedule", rich_help_panel="Use a running service")
-app.add_typer(saved_views.app, name="view", rich_help_panel="Use a running service")
-app.add_typer(token.app, name="token", rich_help_panel="Run a service")
-app.add_typer(user.app, name="user", rich_help_panel="Run a service")
-app.add_typer(database.app, name="db", rich_help_panel="Run a service")
+_HERE, _SERVICE, _OPERATE = N_("Studies"), N_("A service"), N_("Administration")
+#: The words of the command line.
+WORDS: Final = {
+    "run": Word(_HERE, "local:run", N_("Run a study here, without a service.")),
+    "check": Word(_HERE, "local:check", N_("Check a spec; show cases, time and size.")),
+    "submit": Word(_HERE, "remote:submit", N_("Submit a study to a service.")),
+    "list": Word(_HERE, "studies:list_studies", N_("List the studies of a service.")),
+    "show": Word(_HERE, "show:app", N_("Show curves, maps, cases, motions and more.")),
+    "study": Word(_HERE, "study:app", N_("Watch, pause, extend or delete a study.")),
+    "compare": Word(_HERE, "compare:compare", N_("Compare studies.")),
+    "export": Word(_HERE, "export:export", N_("Write all rows of a study, or its report.")),
+    "fit": Word(_HERE, "fit:fit", N_("Fit a clutch to measured data.")),
+    "presets": Word(_HERE, "local:presets", N_("List or print example studies.")),
+    "login": Word(_SERVICE, "login:login", N_("Keep address and token of a service.")),
+    "logout": Word(_SERVICE, "login:logout", N_("Forget them.")),
+    "schedule": Word(_SERVICE, "schedule:app", N_("Studies that run on a schedule.")),
+    "view": Word(_SERVICE, "saved_views:app", N_("Saved views and figures of reports.")),
+    "component": Word(_SERVICE, "components:app", N_("Springs, clutches and motors of the office.")),
+    "models": Word(_SERVICE, "catalogue:models", N_("List models, their parameters and results.")),
+    "serve": Word(_OPERATE, "processes:serve", N_("Start a service.")),
+    "demo": Word(_OPERATE, "demo:demo", N_("Run the example study end to end.")),
+    "settings": Word(_OPERATE, "settings:settings", N_("Show settings with their origin.")),
+    "admin": Word(_OPERATE, "admin:app", N_("Users, tokens, database, workers, doctor.")),
+}  # fmt: skip
 
 
 @cache
-def command_line(language: str) -> TyperGroup:
+def command_line(language: str = languages.ENGLISH) -> TyperGroup:
     """All commands with their options, which typer reads from the signatures of functions; help is in ``language``."""
     tree = cast("TyperGroup", get_command(app))
-    if language != languages.ENGLISH:
+    for option in cast("Any", tree).params:
+        option.hidden = option.hidden or (option.name or "").endswith("_completion")
+    foreign = language != languages.ENGLISH
+    if foreign:
         translate(tree)
+    tree.commands = cast("Any", LazyCommands(WORDS, translate if foreign else lambda _command: None))
     return tree
 
 
 def execute(arguments: Sequence[str]) -> int:
     """Run one command; returns the exit code. Every failure is reported on standard error."""
-    with languages.language(chosen(arguments, os.environ)):
-        return _executed(arguments)
+    common, words = common_first(arguments)
+    before = CURRENT.set(Common(json="--json" in common))
+    try:
+        with languages.language(chosen(common, os.environ)):
+            return _executed(common, words)
+    finally:
+        CURRENT.reset(before)
 
 
-def _executed(arguments: Sequence[str]) -> int:
+def _executed(common: Sequence[str], typed: Sequence[str]) -> int:
     for stream in (sys.stdout, sys.stderr):
         # A terminal with another character set shows an escape instead of ending the command.
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="backslashreplace")
     try:
+        words, new = forwarded(typed)
+        if new and not wants_json():
+            say(_("`sprag {old}` is called `sprag {new}` from now on", old=typed[0], new=new))
         with act_as(of_machine(Door.COMMAND)):
-            code = _invoke(arguments)
+            code = _invoke([*common, *words])
         sys.stdout.flush()
     except (BrokenPipeError, _PipeClosedError):
         _drop_output()
@@ -199,8 +169,7 @@ def _executed(arguments: Sequence[str]) -> int:
     except OSError as error:  # a full disk, or no permission to write temporary files
         _drop_output()
         place = error.filename or _("standard output")
-        failure = TroubleError("write-failed", f"{place}: {(error.strerror or str(error)).lower()}")
-        code = _report(failure, "--json" in arguments)
+        code = _report(TroubleError("write-failed", f"{place}: {(error.strerror or str(error)).lower()}"))
     return int(code)
 
 
@@ -208,26 +177,22 @@ class _PipeClosedError(Exception):
     """The reader of standard output went away."""
 
 
-def _invoke(arguments: Sequence[str]) -> int:
+def _invoke(arguments: list[str]) -> int:
     from sprag_study.worker.ports import ExecutorError, StoreError
 
-    as_json = "--json" in arguments
     try:
-        code = (
-            command_line(languages.current())(list(arguments), prog_name="sprag", standalone_mode=False)
-            or ExitCode.DONE
-        )
+        code = command_line(languages.current())(arguments, prog_name="sprag", standalone_mode=False) or ExitCode.DONE
         if code == ExitCode.INTERRUPTED:  # as typer returns Ctrl-C
             say(_("interrupted"))
         return int(code)
     except CommandFailureError as failure:
-        return _report(failure, as_json)
+        return _report(failure)
     except FaultError as error:
-        return _report(TroubleError(cast("Kind", error.code), error.detail, error.faults), as_json)
+        return _report(TroubleError(cast("Kind", error.code), error.detail, error.faults))
     except (StoreError, ExecutorError) as error:
-        return _report(TroubleError(cast("Kind", error.code), str(error)), as_json)
+        return _report(TroubleError(cast("Kind", error.code), str(error)))
     except typer.TyperException as error:
-        return _usage(error, as_json)
+        return _usage(error)
     except typer.Abort:
         return ExitCode.INTERRUPTED
     except OSError:
@@ -243,23 +208,22 @@ def _invoke(arguments: Sequence[str]) -> int:
             return _report(
                 TroubleError(
                     "missing-extra", _("this command needs a package that is not installed: {command}", command=command)
-                ),
-                as_json,
+                )
             )
         if os.environ.get(DEBUG_VARIABLE):
             traceback.print_exc()
         what = f"{type(error).__name__}: {error}"
         sentence = _("This is a bug in Sprag: {what}. {variable}=1 shows where.", what=what, variable=DEBUG_VARIABLE)
-        return _report(TroubleError("internal", sentence), as_json)
+        return _report(BugError("internal", sentence))
 
 
-def _usage(error: typer.TyperException, as_json: bool) -> int:
+def _usage(error: typer.TyperException) -> int:
     """Report an invalid command line."""
     context = getattr(error, "ctx", None)
     message = error.format_message().replace(": Value error, ", ": ")
     if context is not None and message == context.get_help():  # a group without a command
         say(message)
-    elif as_json:
+    elif wants_json():
         say(json.dumps(WrongInputError("invalid-parameter", message).document(), ensure_ascii=False))
     elif message:
         say(f"sprag: {refusal(message)}")
@@ -268,8 +232,8 @@ def _usage(error: typer.TyperException, as_json: bool) -> int:
     return ExitCode.WRONG_INPUT
 
 
-def _report(failure: CommandFailureError, as_json: bool) -> int:
-    if as_json:
+def _report(failure: CommandFailureError) -> int:
+    if wants_json():
         say(json.dumps(failure.document(), ensure_ascii=False))
     else:
         say(*(f"sprag: {line}" if index == 0 else line for index, line in enumerate(failure.lines())))

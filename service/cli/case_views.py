@@ -1,4 +1,4 @@
-"""``sprag trajectory``, ``branch``, ``basin`` and their like: the views of a case, run here or by a service.
+"""``sprag show ID trajectory``, ``branch``, ``basin`` and their like: the views of a case, run here or by a service.
 
 Their options are the settings of the views (`sprag_study.service.views.setting`); nothing else is loaded before one
 runs.
@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from inspect import Parameter, Signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,27 +16,16 @@ import typer
 
 from sprag_study.service import languages
 from sprag_study.service.cli import completion
+from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import ExitCode, WrongInputError, say, write_json, wrong_option
-from sprag_study.service.cli.file_formats import PICTURES, value_format
+from sprag_study.service.cli.described import option, parameter, query_of, signed
+from sprag_study.service.cli.file_formats import value_format
 from sprag_study.service.cli.files import output, read_study, require_cases, to_file, write_pieces
 from sprag_study.service.cli.names import study_of
-from sprag_study.service.cli.options import (
-    DEFAULT_SERVER,
-    CaseOption,
-    JsonFlag,
-    OutputFile,
-    PictureLanguage,
-    PointsFile,
-    Server,
-    StartOption,
-    TableFiles,
-    Token,
-    ValueFormat,
-    ValueFormatOption,
-    in_language,
-)
+from sprag_study.service.cli.options import SHARED, ValueFormat, in_language
 from sprag_study.service.cli.remote import connection
 from sprag_study.service.faults import Fault, FaultError, choice_of
+from sprag_study.service.formats import PICTURES
 from sprag_study.service.languages import N_, _
 from sprag_study.service.views.case_questions import CASE_VIEWS, TRANSIENT
 from sprag_study.service.views.setting import NamedSetting, ViewInfo, settings_of
@@ -66,22 +54,22 @@ def command(about: ViewInfo) -> Callable[..., None]:
     counted = any(one.option == "--points" for one in asked)  # which then are no file of cases
 
     def run(
-        spec: str, case: int, file: str | None, form: ValueFormat | None, server: str, token: str | None, as_json: bool,
-        points_file: str | None = None, tables: list[str] | None = None, start: int | None = None, every: bool = False,
-        language: str | None = None, **settings: Any,
+        spec: str, case: int, file: str | None, form: ValueFormat | None, points_file: str | None = None,
+        tables: list[str] | None = None, start: int | None = None, every: bool = False, language: str | None = None,
+        **settings: Any,
     ) -> None:  # fmt: skip
-        written = value_format(form, file, as_json, PICTURES if about.pictures else ())
+        written = value_format(form, file, PICTURES if about.pictures else ())
         drawing = in_language(language)
         if is_study(spec):
             from sprag_study.service.client.wire import case_path
 
             _refuse_local(every=every, points_file=points_file, tables=tables)
             query = [*query_of(asked, settings), *([] if start is None else [("start", str(start))]), *drawing]
-            with connection(server, token) as client:
+            with connection() as client:
                 path = case_path(study_of(client, spec), case, f"/{about.name}")
                 with client.pieces(path, [*query, ("format", written)]) as pieces:
                     write_pieces(file, pieces)
-            _say_written(file, written, case, as_json, {})
+            _say_written(file, written, case, {})
             return
         from sprag_study.service.views import cases
 
@@ -97,25 +85,16 @@ def command(about: ViewInfo) -> Callable[..., None]:
             require_language(dict(drawing))
             chosen = view.choose(study, case, about.question(**settings))
         if every:
-            _write_all(study, chosen[0], file, as_json=written == "json")
+            _write_all(study, chosen[0], file, lines=written == "json")
         else:
-            _write(view, study, case, chosen, start, written, file, dict(drawing), as_json)
+            _write(view, study, case, chosen, start, written, file, dict(drawing))
 
     options = [parameter(one.name, option(one), one.default) for one in asked]
-    last = [
-        parameter("case", CaseOption, 0),
-        *([parameter("start", StartOption, None)] if about.starts else ()),
-        *([parameter("every", _EachCase, False)] if about is TRANSIENT else ()),
-        *([parameter("points_file", PointsFile, None)] if not counted else ()),
-        parameter("tables", TableFiles, None), parameter("file", OutputFile, None),
-        parameter("form", ValueFormatOption, None),
-        *([parameter("language", PictureLanguage, None)] if about.pictures else ()),
-        parameter("server", Server, DEFAULT_SERVER),
-        parameter("token", Token, None), parameter("as_json", JsonFlag, False),
-    ]  # fmt: skip
-    run.__doc__ = about.summary
-    run.__signature__ = Signature([parameter("spec", SpecOrStudy, ...), *options, *last])  # type: ignore[attr-defined]
-    return run
+    shared = {"case": 0, **({"start": None} if about.starts else {}), **({} if counted else {"points_file": None})}
+    shared |= {"tables": None, "file": None, "form": None, **({"language": None} if about.pictures else {})}
+    last = [parameter(name, SHARED[name], default) for name, default in shared.items()]
+    last += [parameter("every", _EachCase, False)] if about is TRANSIENT else []
+    return signed(run, about.summary, [parameter("spec", SpecOrStudy, ...), *options, *last])
 
 
 def say_file(file: str, form: str | None, first: int | None = None) -> None:
@@ -146,53 +125,6 @@ def is_study(spec: str) -> bool:
     """Whether an argument names a study of a service: it is no file, and not called like a spec."""
     path = Path(spec)
     return spec != "-" and path.suffix.lower() not in (".json", ".toml") and not path.is_file()
-
-
-def parameter(name: str, annotation: Any, default: Any) -> Parameter:
-    default = Parameter.empty if default is ... else default
-    return Parameter(name, Parameter.POSITIONAL_OR_KEYWORD, annotation=annotation, default=default)
-
-
-#: What the shell offers for a value, by what stands for it in the help.
-_COMPLETED: dict[str, Callable[..., Any]] = {
-    "PATH": completion.parameters, "RESULT": completion.results, "NAME": completion.quantities,
-    "ENDING": completion.endings, "REGIME": completion.regimes, "FLAG": completion.flags, "SORT": completion.sortings,
-}  # fmt: skip
-
-
-def option(asked: NamedSetting) -> Any:
-    """A setting as an option."""
-    setting = asked.setting
-    meaning = f"{setting.meaning[0].upper()}{setting.meaning[1:]}."
-    if asked.type is bool:
-        return Annotated[bool, typer.Option(asked.option, help=meaning)]
-    if asked.type is int:
-        return Annotated[
-            int | None, typer.Option(asked.option, metavar="N", help=meaning, min=setting.low, max=setting.high)
-        ]
-    if setting.positional:
-        return Annotated[list[str], typer.Argument(metavar=f"{setting.metavar}...", help=meaning)]
-    texts = list[str] if asked.several else asked.type
-    given = texts if asked.default is ... else texts | None
-    metavar = f"[{'|'.join(asked.choices)}]" if asked.choices else setting.metavar
-    offered = _offering(asked.choices) if asked.choices else _COMPLETED.get(setting.metavar)
-    return Annotated[given, typer.Option(asked.option, metavar=metavar, help=meaning, autocompletion=offered)]
-
-
-def _offering(choices: Sequence[str]) -> Callable[[str], list[str]]:
-    """Completion of a value by its choices."""
-
-    def offered(incomplete: str) -> list[str]:
-        return [choice for choice in choices if choice.startswith(incomplete)]
-
-    return offered
-
-
-def query_of(asked: Sequence[NamedSetting], settings: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Settings as the query of the view's address, without those that are as the service has them anyway."""
-    from sprag_study.service.client.queries import query_of as query
-
-    return query({one.alias: settings[one.name] for one in asked if settings[one.name] != one.default})
 
 
 def _check_start(study: Study, start: int | None) -> None:
@@ -226,7 +158,7 @@ def _named(options: dict[str, str], fault: Fault) -> str:
 
 def _write(
     view: CaseView[Any, Any, Any], study: Study, case: int, chosen: Any, start: int | None, form: Any,
-    file: str | None, drawing: Mapping[str, str], as_json: bool,
+    file: str | None, drawing: Mapping[str, str],
 ) -> None:  # fmt: skip
     """Compute the view of a case, write it, and say what it has."""
     from sprag_study.service.reading.reader import shown
@@ -248,21 +180,21 @@ def _write(
         pairs = (row for one in told.tables if len(one.columns) == 2 for row in one.rows)  # others are the file itself
         for row in pairs:
             say("  " + ": ".join(shown(cell) for cell in row if isinstance(cell, str)))
-    _say_written(file, form, case, as_json, {} if said is None else said.data)
+    _say_written(file, form, case, {} if said is None else said.data)
     if said is not None and not said.ok:
         raise typer.Exit(ExitCode.NOT_ALL_OK)
 
 
-def _say_written(file: str | None, form: str, case: int, as_json: bool, data: Mapping[str, Any]) -> None:
+def _say_written(file: str | None, form: str, case: int, data: Mapping[str, Any]) -> None:
     """Say which file was written, for people and where asked for programs."""
     if file is None or not to_file(file):
         return
     say_file(file, form)
-    if as_json:
+    if wants_json():
         write_json({"file": file, "case": case, **data})
 
 
-def _write_all(study: Study, course: Course, file: str | None, *, as_json: bool) -> None:
+def _write_all(study: Study, course: Course, file: str | None, *, lines: bool) -> None:
     """Write a row for each case; a line of JSON each, or CSV with a line of headings."""
     from sprag_study.service.exports.text import csv_lines
     from sprag_study.service.json_text import to_bytes
@@ -270,12 +202,12 @@ def _write_all(study: Study, course: Course, file: str | None, *, as_json: bool)
 
     ends: Counter[str] = Counter()
     with output(file) as write:
-        if not as_json:
+        if not lines:
             write(csv_lines([row_headings(study)]))
         for row in case_rows(study, course):
             ends[str(row["outcome"])] += 1
             cells = ["" if value is None else value for value in row.values()]
-            write(to_bytes(row) + b"\n" if as_json else csv_lines([cells]))
+            write(to_bytes(row) + b"\n" if lines else csv_lines([cells]))
     text = ", ".join(f"{count} {outcome}" for outcome, count in ends.most_common())
     say(_("{count} cases: {text}", count=study.cases, text=text))
     if set(ends) - {completed(course)}:

@@ -1,74 +1,85 @@
-"""``sprag cases``: the finished cases of a study of a running service, chosen and sorted."""
+"""``sprag show ID cases``: the finished cases of a study of a running service, chosen and sorted."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import typer
 
 from sprag_study.service.cli import completion
+from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.compare import pair
-from sprag_study.service.cli.console import WrongInputError, show_table, write_json
+from sprag_study.service.cli.console import WrongInputError, say, show_table, write_json
+from sprag_study.service.cli.described import option, parameter, query_of, signed
 from sprag_study.service.cli.names import study_of
-from sprag_study.service.cli.options import DEFAULT_SERVER, JsonFlag, OfEnding, OfFlag, OfRegime, Server, StudyId, Token
+from sprag_study.service.cli.options import CaseOption, StudyId
 from sprag_study.service.cli.remote import connection
 from sprag_study.service.cli.shown import heading
 from sprag_study.service.faults import Fault
 from sprag_study.service.languages import N_, _
+from sprag_study.service.views.setting import settings_of
+from sprag_study.service.views.study_questions import CasesQuestion, SelectionQuestion
 
 #: Most cases of one request.
 _PAGE = 500
 
 
-def cases(
-    study_id: StudyId,
-    ending: OfEnding = None,
-    regime: OfRegime = None,
-    flag: OfFlag = None,
-    where: Annotated[
-        list[str] | None,
-        typer.Option("--where", metavar="RANGE", help="Range such as 'efficiency >= 0.5'; may be repeated."),
-    ] = None,
-    at: Annotated[
-        list[str] | None, typer.Option("--at", metavar="PATH=VALUE", help="Only this value of an axis.")
-    ] = None,
-    sort: Annotated[
-        str | None,
-        typer.Option(
-            "--sort",
-            metavar="NAME",
-            help="Parameter, result, case, ending, regime or flags; -NAME: largest first.",
-            autocompletion=completion.sortings,
-        ),
-    ] = None,
-    result: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--result", metavar="RESULT", help="Result to show; may be repeated.", autocompletion=completion.results
-        ),
-    ] = None,
-    limit: Annotated[int, typer.Option(min=1, max=100_000, help="Most cases to show.")] = 50,
-    server: Server = DEFAULT_SERVER,
-    token: Token = None,
-    as_json: JsonFlag = False,
-) -> None:
-    """List finished cases of a study, in order of their numbers or sorted over all of them."""
-    from sprag_study.service.client.queries import query_of
+_ASKED: Final = (
+    *settings_of(SelectionQuestion),
+    *(one for one in settings_of(CasesQuestion) if one.name == "at"),
+)
+_Results = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--result", metavar="RESULT", help="Result to show; may be repeated.", autocompletion=completion.results
+    ),
+]
+_Limit = Annotated[int, typer.Option(min=1, max=100_000, help="Most cases to show.")]
+
+
+def _cases(study_id: str, result: list[str] | None, limit: int, **asked: Any) -> None:
     from sprag_study.service.client.wire import study_path
 
-    held = dict(pair(text) for text in at or ())
-    with connection(server, token) as client:
-        study_id = study_of(client, study_id)
-        chosen = {"ending": ending, "regime": regime, "flag": flag, "where": where, "at": held, "sort": sort}
-        query = query_of({**chosen, "page_size": min(limit, _PAGE)})
-        found, units = _first(client.pages(f"{study_path(study_id)}/cases", query), limit)
-    if as_json:
+    for text in asked["at"] or ():
+        pair(text)
+    with connection() as client:
+        query = [*query_of(_ASKED, asked), ("page_size", str(min(limit, _PAGE)))]
+        found, units = _first(client.pages(f"{study_path(study_of(client, study_id))}/cases", query), limit)
+    if wants_json():
         write_json({"cases": found})
     elif found:
         _show(found, result or (), units)
     else:
         show_table("", ((_("case"), True), (_("ending"), False)), ())
+
+
+cases: Final = signed(
+    _cases,
+    "List finished cases of a study, in order of their numbers or sorted over all of them.",
+    [
+        parameter("study_id", StudyId, ...), *(parameter(one.name, option(one), one.default) for one in _ASKED),
+        parameter("result", _Results, None), parameter("limit", _Limit, 50),
+    ],
+)  # fmt: skip
+
+
+def case(study_id: StudyId, case: CaseOption = 0) -> None:
+    """Show one case: how it ended, its parameters and its results."""
+    from sprag_study.service.client.wire import case_path
+
+    with connection() as client:
+        found = client.request("GET", case_path(study_of(client, study_id), case, ""))
+    if wants_json():
+        write_json(found)
+        return
+    meaning = f"{found['ending']}. {_(found['ending_meaning'])}"
+    say(_("case {case}: {text}", case=found["case"], text=meaning))
+    say(*(f"{flag}: {_(meaning)}" for flag, meaning in found["flag_meanings"].items()))
+    units = {name: "" if unit == "1" else unit for name, unit in found["units"].items()}
+    for title, values in ((_("parameters"), found["parameters"]), (_("results"), found["results"])):
+        rows = [(name, value, units.get(name, "")) for name, value in values.items()]
+        show_table(title, ((_("name"), False), (_("value"), True), (_("unit"), False, True)), rows)
 
 
 def _first(pages: Iterable[dict[str, Any]], limit: int) -> tuple[list[dict[str, Any]], dict[str, str]]:

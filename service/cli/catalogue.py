@@ -7,8 +7,8 @@ from typing import Annotated
 import typer
 
 from sprag_study.service.cli import completion
+from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import show_table, write_json
-from sprag_study.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, Token
 from sprag_study.service.cli.remote import connection
 from sprag_study.service.languages import _
 
@@ -22,16 +22,13 @@ def models(
             autocompletion=completion.models,
         ),
     ] = None,
-    server: Server = DEFAULT_SERVER,
-    token: Token = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """List the models of a service, or the parameters and results of one."""
     from sprag_study.service.client.wire import model_path
 
-    with connection(server, token) as client:
+    with connection() as client:
         found = client.request("GET", "/models" if name is None else model_path(name))
-    if as_json:
+    if wants_json():
         write_json(found)
     elif name is None:
         columns = ((_("model"), False, True), (_("parameters"), True), (_("results"), True), (_("engine"), False))

@@ -9,9 +9,10 @@ import typer
 
 from sprag_study.service.answers.differing import MOST_COMPARED
 from sprag_study.service.cli import completion
+from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import Column, say, show_table, write_json, wrong_option
 from sprag_study.service.cli.names import study_of
-from sprag_study.service.cli.options import DEFAULT_SERVER, CurveBy, JsonFlag, Server, Token
+from sprag_study.service.cli.options import CurveBy
 from sprag_study.service.cli.remote import connection
 from sprag_study.service.cli.shown import show_curves
 from sprag_study.service.languages import N_, _
@@ -46,9 +47,6 @@ def compare(
     at: Annotated[
         list[str] | None, typer.Option("--at", metavar="PATH=VALUE", help="Value at which another axis is held.")
     ] = None,
-    server: Server = DEFAULT_SERVER,
-    token: Token = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """Compare studies: the inputs in which they differ, and the same curves of each."""
     from sprag_study.service.client import Study
@@ -59,10 +57,10 @@ def compare(
             "ID", "out-of-range", N_("wrong number of studies"), len(studies), allowed=f"2 .. {MOST_COMPARED}"
         )
     held = dict(pair(text) for text in at or ())
-    with connection(server, token) as client:
+    with connection() as client:
         named = [Study(client, study_of(client, text)) for text in studies]
         found = side_by_side(named, x, y or (), by=by or (), at=held)
-    if as_json:
+    if wants_json():
         curves = {name: curves.data for name, curves in zip(found.names, found.curves, strict=False)}
         write_json({"studies": list(found.names), "inputs": found.inputs, "curves": curves})
         return

@@ -6,10 +6,11 @@ from typing import Annotated, Any, cast
 
 import typer
 
+from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import say, show_table, write_json
 from sprag_study.service.cli.files import decode, read_bytes, read_spec, write_pieces
 from sprag_study.service.cli.groups import Groups
-from sprag_study.service.cli.options import DEFAULT_SERVER, JsonFlag, OutputFile, Server, Token
+from sprag_study.service.cli.options import OutputFile
 from sprag_study.service.cli.remote import connection
 from sprag_study.service.languages import _
 from sprag_study.worker.limits import MAX_BODY_BYTES
@@ -23,42 +24,47 @@ Kind = Annotated[str | None, typer.Option("--kind", metavar="KIND", help="Only s
 def list_components(
     kind: Kind = None,
     file: OutputFile = None,
-    server: Server = DEFAULT_SERVER,
-    token: Token = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """List the components, or write them as a CSV file that `put` reads."""
-    with connection(server, token) as client:
+    with connection() as client:
         if file is not None:
             query = [("format", "csv"), *([] if kind is None else [("kind", kind)])]
             with client.pieces("/components", query) as pieces:
                 write_pieces(file, pieces)
             return
         found = client.request("GET", "/components", params={} if kind is None else {"kind": kind})
-    if as_json:
+    if wants_json():
         write_json(found)
         return
     columns = ((_("id"), False, True), (_("kind"), False), (_("name"), False), (_("fields"), False), (_("note"), False))
     rows = []
     for one in found["components"]:
-        fields = ", ".join(f"{name} {text}" for name, text in one["fields"].items())
+        fields = ", ".join(f"{name} {text}" for name, text in _read(one).items())
         rows.append((one["id"], one["kind"], one["name"], fields, one["note"]))
     show_table("", columns, rows)
+
+
+def _read(component: dict[str, Any]) -> dict[str, str]:
+    """The fields with their units, as pages show them; as they were typed where the models are not installed."""
+    try:
+        from sprag_study.service.reading.quantities import TYPED
+        from sprag_study.service.spec.components import Component
+        from sprag_study.service.views.components import shown_fields
+    except ModuleNotFoundError:
+        return dict(component["fields"])
+    return shown_fields(Component(*(component[name] for name in ("kind", "name", "note", "fields"))), TYPED)
 
 
 @app.command()
 def put(
     file: Annotated[str, typer.Argument(metavar="FILE", help="CSV file, or JSON as the interface takes it.")],
-    server: Server = DEFAULT_SERVER,
-    token: Token = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """Add the components of a file, all or none; those of the same kind and name are replaced."""
     text = decode(file, read_bytes(file, MAX_BODY_BYTES))
     body = cast("dict[str, Any]", read_spec(file)) if file.lower().endswith(".json") else {"csv": text}
-    with connection(server, token) as client:
+    with connection() as client:
         made = client.request("POST", "/components", json=body)
-    if as_json:
+    if wants_json():
         write_json(made)
     else:
         say(_("{count} components are in the catalogue", count=len(made["components"])))
@@ -67,9 +73,7 @@ def put(
 @app.command()
 def delete(
     component_id: Annotated[str, typer.Argument(metavar="ID", help="Id of the component.")],
-    server: Server = DEFAULT_SERVER,
-    token: Token = None,
 ) -> None:
     """Remove a component; studies that took it keep its values."""
-    with connection(server, token) as client:
+    with connection() as client:
         client.delete_component(component_id)

@@ -40,9 +40,10 @@ class ExitCode(IntEnum):
     """Exit codes of every command."""
 
     DONE = 0
-    NOT_ALL_OK = 1
+    FAULT = 1
     WRONG_INPUT = 2
     TROUBLE = 3
+    NOT_ALL_OK = 4
     INTERRUPTED = 130
     PIPE_CLOSED = 141
 
@@ -54,9 +55,10 @@ class ExitCode(IntEnum):
 
 _EXIT_SENTENCES: Final = {
     ExitCode.DONE: N_("done"),
-    ExitCode.NOT_ALL_OK: N_("some cases did not end ok"),
+    ExitCode.FAULT: N_("a fault of this program"),
     ExitCode.WRONG_INPUT: N_("wrong input; every problem has its own line: where, what, the value, what is allowed"),
     ExitCode.TROUBLE: N_("the service does not answer, a disk is full or fails, or the database cannot be used"),
+    ExitCode.NOT_ALL_OK: N_("some cases did not end ok, or something of a night needs attention"),
     ExitCode.INTERRUPTED: N_("interrupted with Ctrl-C"),
     ExitCode.PIPE_CLOSED: N_("the reader of standard output went away"),
 }
@@ -130,6 +132,12 @@ class WrongInputError(CommandFailureError):
 
 class TroubleError(CommandFailureError):
     """The service or the storage has a problem: exit code 3."""
+
+
+class BugError(CommandFailureError):
+    """The program itself is wrong: exit code 1."""
+
+    exit_code = ExitCode.FAULT
 
 
 def wrong_option(
@@ -219,22 +227,36 @@ def show_table(title: str, columns: Iterable[Column], rows: Iterable[Sequence[ob
     """Print a table on standard output; None becomes a dash: a value that could not be computed.
 
     On a terminal it is as wide as that: headings and texts are broken into lines, and columns for which there is no
-    room go on below, each time beside the first one. Elsewhere every row is one line. Numbers and ids are never cut,
-    and names with dots only after these.
+    room go on below, each time beside the first one. Numbers and ids are never cut, and names with dots only after
+    these. Elsewhere it is for programs: the title alone in its line, then headings and rows with tabs between cells.
     """
+    headed = list(columns)
+    texts = [[cell_text(cell) for cell in row] for row in rows]
+    if not sys.stdout.isatty():
+        lines = [[heading.replace(".\n", ".") for heading, *_ in headed], *texts]
+        write_text(
+            "".join(
+                f"{line}\n" for line in ([title] if title else []) + ["\t".join(map(_flat, line)) for line in lines]
+            )
+        )
+        return
     from rich.cells import cell_len
 
-    out, headed = console(), list(columns)
-    texts = [[cell_text(cell) for cell in row] for row in rows]
+    out = console()
     shapes = []
     for index, (heading, numeric, *whole) in enumerate(headed):
         longest = max((cell_len(row[index]) for row in texts), default=0)
         piece = longest if numeric else max((longest_piece(row[index], cell_len) for row in texts), default=0)
         shapes.append(Shape(heading, longest, numeric or any(whole), piece))
-    parts = blocks(shapes, out.width if sys.stdout.isatty() else None)
+    parts = blocks(shapes, out.width)
     out.width = max(out.width, *(width_of([*part.values()]) for part in parts))
     for number, part in enumerate(parts):
         out.print(_table(title if number == 0 else "", headed, part, texts))
+
+
+def _flat(cell: str) -> str:
+    """A cell without what separates cells and lines."""
+    return " ".join(re.split(r"[\t\r\n]+", cell))
 
 
 def _table(title: str, columns: Sequence[Column], widths: Mapping[int, int], texts: Iterable[Sequence[str]]) -> Table:

@@ -1,4 +1,4 @@
-"""``sprag db``: upgrade, check, back up, move and adopt the database."""
+"""``sprag admin db``: upgrade, check, back up, move and adopt the database."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.configured import read_settings
 from sprag_study.service.cli.console import ExitCode, TroubleError, WrongInputError, say, write_json
 from sprag_study.service.cli.files import write_pieces
 from sprag_study.service.cli.groups import Groups
-from sprag_study.service.cli.options import Database, JsonFlag, OutputFile
+from sprag_study.service.cli.options import Database, OutputFile
 from sprag_study.service.cli.stores import database_of, named_store
 from sprag_study.service.faults import FaultError
 from sprag_study.service.languages import _
@@ -44,7 +45,6 @@ def upgrade(
         bool, typer.Option("--no-backup", help="Do not copy the database file beside itself before.")
     ] = False,
     db: Database = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """Bring the database to the revision of this program, or create it; stop Sprag first. It copies a file before."""
     from sprag_study.service.jobs.dispatching import owner_name
@@ -52,7 +52,7 @@ def upgrade(
 
     done = bring_up(read_settings(database=db).database_url, owner_name(), copy=not no_backup)
     where = {"database": done.location}
-    if as_json:
+    if wants_json():
         copy = None if done.backup is None else str(done.backup)
         write_json({**where, "before": done.before, "after": done.after, "backup": copy})
         return
@@ -66,13 +66,13 @@ def upgrade(
 
 
 @app.command()
-def check(db: Database = None, as_json: JsonFlag = False) -> None:
+def check(db: Database = None) -> None:
     """Check the whole database; takes minutes on a large one. Exit code 3 when something is wrong."""
     from sprag_study.service.storage.maintenance import check as look_over
 
     with _opened(db) as session:
         report = look_over(session)
-    if as_json:
+    if wants_json():
         write_json({**asdict(report), "sound": not report.problems})
     else:
         backend = f"{report.backend} {report.backend_version}".rstrip()
@@ -91,7 +91,6 @@ def check(db: Database = None, as_json: JsonFlag = False) -> None:
 def backup(
     file: Annotated[str, typer.Argument(metavar="FILE", help="File to write; it must not exist.")],
     db: Database = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """Write a consistent copy of the database while others use it. Exit code 3: rows in it changed on the disk."""
     from sprag_study.service.storage.maintenance import backup as write_copy
@@ -102,7 +101,7 @@ def backup(
     with _opened(db) as session:
         problems = write_copy(session, target)
     size = target.stat().st_size
-    if as_json:
+    if wants_json():
         write_json({"database": session.location, "backup": str(target), "bytes": size, "problems": problems})
     else:
         say(_("{file}: {size} bytes, a copy of {database}", file=file, size=size, database=session.location))
@@ -116,19 +115,18 @@ def prune(
     ],
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only list them.")] = False,
     db: Database = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """Delete every study that ended longer ago than --older-than days, with all its results."""
     from datetime import timedelta
 
     from sprag_study.service.storage.clock_watch import distrust
 
-    with named_store(db, quiet=as_json) as store:
+    with named_store(db) as store:
         if not dry_run and (problem := distrust(store.dispatchers)):
             raise TroubleError("unavailable", f"{problem}.")
         found = store.purging.prune(store.clock.now() - timedelta(days=older_than), dry=dry_run)
         store.purging.purge()
-    if as_json:
+    if wants_json():
         deleted = [] if dry_run else found
         write_json({"database": store.session.location, "deleted": deleted, "found": found})
     else:
@@ -146,12 +144,11 @@ def move(
         str, typer.Argument(metavar="TARGET", help="File or URL of an empty database, or that of an interrupted move.")
     ],
     db: Database = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """Copy the whole database into another one, SQLite or PostgreSQL, and compare every row; stop Sprag first.
 
     The source stays as it is. The same command continues an interrupted move. Schedules and reports of the target
-    are off until `sprag db adopt`. Exit code 3: rows in it changed on the disk, and were copied as they are.
+    are off until `sprag admin db adopt`. Exit code 3: rows in it changed on the disk, and were copied as they are.
     """
     from sprag_study.service.jobs.dispatching import owner_name
     from sprag_study.service.storage.moving import move as move_all
@@ -160,12 +157,12 @@ def move(
         raise WrongInputError("invalid-file", _("TARGET is empty: name a file or a URL"))
     with _opened(db) as source, _opened(target, create=True) as other:
         moved = move_all(source, other, owner_name(), say)
-    if as_json:
+    if wants_json():
         write_json({"source": source.location, "target": other.location, **asdict(moved)})
     else:
         places = {"target": other.location, "source": source.location}
         print(_("{target} has every row of {source}; use it with --db from now on", **places))
-        say(_("its schedules and reports are off until `sprag db adopt`; no longer start {source}", **places))
+        say(_("its schedules and reports are off until `sprag admin db adopt`; no longer start {source}", **places))
     _tell_damaged(moved.problems)
 
 
@@ -201,7 +198,7 @@ def audit(
     except FaultError as error:
         named = [replace(fault, where=f"--{fault.where}") for fault in error.faults]
         raise WrongInputError("invalid-parameter", _("invalid option"), named) from error
-    with named_store(db, quiet=False) as store:
+    with named_store(db) as store:
         write_pieces(output, audit_pieces(store.audit.rows(wanted), form.value))
 
 
@@ -233,7 +230,7 @@ def _opened(db: str | None, *, create: bool = False) -> Iterator[Session]:
 @app.command()
 def clock(db: Database = None) -> None:
     """Confirm the clock of this machine, after it jumped ahead or the worker was off for long."""
-    with named_store(db, quiet=False) as store:
+    with named_store(db) as store:
         now = store.clock.now()
         store.dispatchers.note_clock(now)
         store.audit.note("database.clock", "", now=now.isoformat(timespec="seconds"))
@@ -243,7 +240,7 @@ def clock(db: Database = None) -> None:
 @app.command()
 def adopt(db: Database = None) -> None:
     """Confirm that this database, a copy or a moved one, is the deployment: its schedules run, its reports are sent."""
-    with named_store(db, quiet=False) as store:
+    with named_store(db) as store:
         if store.deployment.adopt():
             say(_("its schedules are on from now on: see to it that the original is no longer used"))
         else:

@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import ExitCode, TroubleError, say, show_table, write_json
 from sprag_study.service.cli.files import file_failure, write_pieces
 from sprag_study.service.cli.following import follow
-from sprag_study.service.cli.options import JsonFlag
-from sprag_study.service.cli.remote import connection
+from sprag_study.service.cli.remote import served_by
 from sprag_study.service.languages import N_, _, decimal
 
 if TYPE_CHECKING:
@@ -42,7 +42,6 @@ _BAR = 20
 def demo(
     leave: Annotated[bool, typer.Option("--exit", help="Stop the service after the demonstration.")] = False,
     folder: Annotated[str, typer.Option("--dir", metavar="FOLDER", help="Folder for database and picture.")] = "demo",
-    as_json: JsonFlag = False,
 ) -> None:
     """Run the example study end to end: start a service, submit over HTTP, show the curve, then keep serving."""
     target = Path(folder)
@@ -50,8 +49,8 @@ def demo(
         target.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise file_failure(target, error) from error
-    with _service(target / "sprag.sqlite3") as (address, process), connection(address, None) as client:
-        study = _show(client, target / "curve.png", as_json)
+    with _service(target / "sprag.sqlite3") as (address, process), served_by(address) as client:
+        study = _show(client, target / "curve.png")
         if not leave:
             say(_("Open {address} (Ctrl-C ends the service).", address=address + study["links"]["page"]))
             with suppress(KeyboardInterrupt):
@@ -95,7 +94,7 @@ def _stop(process: subprocess.Popen[bytes]) -> None:
         process.wait()
 
 
-def _show(client: Client, picture: Path, as_json: bool) -> dict[str, Any]:
+def _show(client: Client, picture: Path) -> dict[str, Any]:
     """Submit the study, follow it, show its curve and write the picture; the study at its end."""
     from sprag_study.service.client.wire import study_path
     from sprag_study.service.presets import preset_text
@@ -119,7 +118,7 @@ def _show(client: Client, picture: Path, as_json: bool) -> dict[str, Any]:
     curves = client.request("GET", path, params=query)
     with client.pieces(path, [*query, ("format", picture.suffix[1:])]) as pieces:
         write_pieces(str(picture), pieces)
-    if as_json:
+    if wants_json():
         write_json({"study": study, "curves": curves, "picture": str(picture), "server": client.server})
     else:
         _show_curve(curves)

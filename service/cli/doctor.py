@@ -1,4 +1,4 @@
-"""``sprag doctor``: checks of the installation."""
+"""``sprag admin doctor``: checks of the installation."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ from typing import Annotated, Any
 
 import typer
 
+from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.configured import read_settings
 from sprag_study.service.cli.console import ExitCode, WrongInputError, console, write_json, write_text
-from sprag_study.service.cli.options import Database, JsonFlag
+from sprag_study.service.cli.options import Database
 from sprag_study.service.faults import Fault
 from sprag_study.service.languages import N_, _, decimal, recorded
 from sprag_study.worker.limits import MAX_TOLERANCE, MIN_TOLERANCE
@@ -50,13 +51,12 @@ def doctor(
         float | None,
         typer.Option(min=MIN_TOLERANCE, max=MAX_TOLERANCE, help="Tolerance it is for; default: 1e-9."),
     ] = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """Check versions, database, permissions, disk, backups, kernels and known values; exit code 3 on any problem."""
     shape = {"pendulums": pendulums, "coefficients": coefficients, "tolerance": tolerance}
     given = {name: value for name, value in shape.items() if value is not None}
     if kernel:
-        _show_kernel(_KERNEL | given, as_json)
+        _show_kernel(_KERNEL | given)
         return
     if given:
         problems = [
@@ -64,21 +64,23 @@ def doctor(
             for name, value in given.items()
         ]
         raise WrongInputError("invalid-parameter", _("invalid option"), problems)
-    findings = list(examine(db))
+    screen, findings = console(), []
+    for finding in examine(db):
+        findings.append(finding)
+        if wants_json():
+            continue
+        mark, style = (_("ok"), "green") if finding.ok else (_("WRONG"), "bold red")
+        screen.print(f"{mark:>5}", style=style, end="  ")
+        screen.print(f"{finding.subject}: {finding.detail}", markup=False, soft_wrap=True)
+        sys.stdout.flush()
     sound = all(finding.ok for finding in findings)
-    if as_json:
+    if wants_json():
         write_json({"sound": sound, "findings": [asdict(finding) for finding in findings]})
-    else:
-        screen = console()
-        for finding in findings:
-            mark, style = (_("ok"), "green") if finding.ok else (_("WRONG"), "bold red")
-            screen.print(f"{mark:>5}", style=style, end="  ")
-            screen.print(f"{finding.subject}: {finding.detail}", markup=False, soft_wrap=True)
     if not sound:
         raise typer.Exit(ExitCode.TROUBLE)
 
 
-def _show_kernel(shape: dict[str, Any], as_json: bool) -> None:
+def _show_kernel(shape: dict[str, Any]) -> None:
     from sprag_study.worker.models import MAX_COEFFICIENTS, MAX_PENDULUMS, kernel_source
 
     for name, most in (("pendulums", MAX_PENDULUMS), ("coefficients", MAX_COEFFICIENTS)):
@@ -86,7 +88,7 @@ def _show_kernel(shape: dict[str, Any], as_json: bool) -> None:
             problem = Fault(f"--{name}", "unknown-name", N_("is out of range"), shape[name], allowed=f"1 .. {most}")
             raise WrongInputError("invalid-parameter", _("invalid option"), [problem])
     text = kernel_source(**shape)
-    if as_json:
+    if wants_json():
         write_json({**shape, "source": text})
     else:
         write_text(text)
@@ -159,7 +161,7 @@ def _database(url: str, file: Path | None) -> tuple[bool, str]:
         session.close()
     if found not in (None, HEAD_REVISION):
         return False, _(
-            "{database} has revision {found}, this program needs {needed}: run `sprag db upgrade`",
+            "{database} has revision {found}, this program needs {needed}: run `sprag admin db upgrade`",
             database=location,
             found=found,
             needed=HEAD_REVISION,
@@ -208,7 +210,9 @@ def _workers(url: str, file: Path | None) -> tuple[bool, str]:
     silent = [item["owner"] for item in found["dispatchers"] if item["silent"] and not item["ended_at"]]
     if silent:
         who = ", ".join(silent)
-        return False, _("no heartbeat from {names}: `sprag worker --take-over` replaces a worker that hangs", names=who)
+        return False, _(
+            "no heartbeat from {names}: `sprag admin worker --take-over` replaces a worker that hangs", names=who
+        )
     if not alive:
         return True, _("none is running")
     if shortage := next((item["shortage"] for item in alive if item["shortage"]), None):
@@ -262,7 +266,9 @@ def _backups() -> tuple[bool, str]:
         return True, _("no backups are made (SPRAG_BACKUP_FOLDER is not set)")
     found = backups(Path(folder).expanduser())
     if not found:
-        return False, _("there is none in {folder} yet: is `sprag serve` or `sprag worker` running?", folder=folder)
+        return False, _(
+            "there is none in {folder} yet: is `sprag serve` or `sprag admin worker` running?", folder=folder
+        )
     age = datetime.now(UTC) - found[-1][0]
     hours = round(age.total_seconds() / 3600)
     text = _("{count} in {folder}, the latest {hours} hours old", count=len(found), folder=folder, hours=hours)

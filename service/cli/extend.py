@@ -1,4 +1,4 @@
-"""``sprag extend``, ``longer`` and ``narrow``: further cases, more time and smaller steps for a study of a service."""
+"""``sprag study extend``, ``longer`` and ``narrow``: further cases, more time and smaller steps."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sprag_study.service.cli.console import say, warning_lines, wrong_option
 from sprag_study.service.cli.files import decode, read_bytes
 from sprag_study.service.cli.following import further, submitted
 from sprag_study.service.cli.names import study_of
-from sprag_study.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, StudyId, Token, Wait, WaitTimeout
+from sprag_study.service.cli.options import StudyId, Wait, WaitTimeout
 from sprag_study.service.cli.remote import connection
 from sprag_study.service.languages import N_, _, ngettext
 from sprag_study.service.reading.numbers import assumption, could_be_one, in_language, parse_number, settle, settled
@@ -44,20 +44,17 @@ def extend(
     ] = None,
     wait: Wait = False,
     timeout: WaitTimeout = None,
-    server: Server = DEFAULT_SERVER,
-    token: Token = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """Submit a study with more values on the axes of an old one, or more cases; only new cases are run."""
     from sprag_study.service.client.wire import study_path
 
     addition = _addition(axis or [], points)
-    with connection(server, token) as client:
+    with connection() as client:
         study_id = study_of(client, study_id)
         old = client.request("GET", study_path(study_id))
         study = further(client, study_id, "extend", json=addition)
         say(_what_is_new(old, study))
-        submitted(client, study, wait, timeout, as_json)
+        submitted(client, study, wait, timeout)
 
 
 def longer(
@@ -82,18 +79,15 @@ def longer(
     ] = None,
     wait: Wait = False,
     timeout: WaitTimeout = None,
-    server: Server = DEFAULT_SERVER,
-    token: Token = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """Submit a study of the unsettled cases of another, with more time for each."""
     from sprag_study.service.client.queries import query_of
 
-    with connection(server, token) as client:
+    with connection() as client:
         study = further(
             client, study_of(client, study_id), "longer", params=query_of({"regime": regime, "at_most": at_most})
         )
-        submitted(client, study, wait, timeout, as_json)
+        submitted(client, study, wait, timeout)
 
 
 def narrow(
@@ -110,15 +104,12 @@ def narrow(
     ] = None,
     wait: Wait = False,
     timeout: WaitTimeout = None,
-    server: Server = DEFAULT_SERVER,
-    token: Token = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """Submit the sweep of a study again, with smaller steps where its motion jumps."""
     query = [("steps", str(steps)), *(("at", text) for text in at or [])]
-    with connection(server, token) as client:
+    with connection() as client:
         study = further(client, study_of(client, study_id), "narrow", params=query)
-        submitted(client, study, wait, timeout, as_json)
+        submitted(client, study, wait, timeout)
 
 
 def _what_is_new(old: Mapping[str, Any], study: Mapping[str, Any]) -> str:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import PurePath
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
 
+import typer
+
+from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import WrongInputError, wrong_option
 from sprag_study.service.cli.files import to_file
 from sprag_study.service.cli.options import ValueFormat
@@ -14,8 +17,9 @@ from sprag_study.service.languages import N_, _
 
 #: Formats of a whole study: case rows (`sprag_study.service.exports`) and documents (`sprag_study.service.report`).
 TableFormat = Literal[Format, ReportFormat]
-#: Formats of pictures.
-PICTURES: Final = ("svg", "png", "pdf")
+TableFormOption = Annotated[
+    TableFormat | None, typer.Option("--format", help="Default: by the ending of FILE; csv where it has none.")
+]
 #: Endings of their files.
 _TABLES: Final = (*(ending for endings in SUFFIXES.values() for ending in endings), *REPORT_FORMATS)
 
@@ -28,23 +32,23 @@ def file_format(file: str, allowed: Sequence[str]) -> str:
     return form
 
 
-def table_format(form: TableFormat | None, file: str | None, as_json: bool) -> TableFormat:
+def table_format(form: TableFormat | None, file: str | None) -> TableFormat:
     """The format of a whole study; WrongInputError where only the file's name tells it, by an unknown ending."""
     if form is not None:
         return form
     if file is None or not _has_ending(file):
-        return "json" if as_json else "csv"
+        return "json" if wants_json() else "csv"
     found = format_of(file)
     if found is None:
         raise _wrong_ending(file, _TABLES)
     return found
 
 
-def value_format(form: ValueFormat | None, file: str | None, as_json: bool, pictures: Sequence[str] = ()) -> str:
+def value_format(form: ValueFormat | None, file: str | None, pictures: Sequence[str] = ()) -> str:
     """The format of a view of one case; WrongInputError where only the file's name tells it, by an unknown ending."""
     if form is None and file is not None and _has_ending(file):
         return file_format(file, (*ValueFormat, *pictures))
-    return "json" if (as_json if form is None else form is ValueFormat.JSON) else "csv"
+    return "json" if (wants_json() if form is None else form is ValueFormat.JSON) else "csv"
 
 
 def require_csv(header: Header | None, form: str) -> None:

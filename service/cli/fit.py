@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import (
     WrongInputError,
     cell_text,
@@ -19,7 +20,6 @@ from sprag_study.service.cli.console import (
     wrong_option,
 )
 from sprag_study.service.cli.files import MAX_DATA_BYTES, decode, read_bytes
-from sprag_study.service.cli.options import JsonFlag
 from sprag_study.service.faults import Fault, warned
 from sprag_study.service.languages import N_, _
 from sprag_study.service.reading.numbers import parse_number
@@ -60,7 +60,6 @@ def fit(
     backlash: Annotated[
         str, typer.Option(metavar="ANGLE", help='Backlash in the angles, in rad or with a unit ("0.3 deg").')
     ] = "0",
-    as_json: JsonFlag = False,
 ) -> None:
     """Fit the clutch polynomial of lowest degree that reaches the accuracy, and report on it.
 
@@ -79,7 +78,7 @@ def fit(
         through_origin=not full,
         angles_include_backlash=angles_include_backlash,
     )
-    if as_json:
+    if wants_json():
         from sprag_study.service.results.fits import fit_json
 
         write_json({**fit_json(made), **warned((*measured.warnings, *made.warnings))})
@@ -99,11 +98,10 @@ def _quantity(option: str, text: str, unit: str) -> float:
 
 
 def _measured(path: str) -> MeasuredData:
-    from sprag_study.service.reading.units import parse_quantity
     from sprag_study.service.spec.measured import MeasuredDataError, parse_measured
 
     try:
-        return parse_measured(decode(path, read_bytes(path, MAX_DATA_BYTES)), parse_quantity)
+        return parse_measured(decode(path, read_bytes(path, MAX_DATA_BYTES)))
     except MeasuredDataError as error:
         raise WrongInputError("invalid-data", _("{file}: no measured clutch data", file=path), error.faults) from error
 

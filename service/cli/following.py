@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import (
     OK,
     ExitCode,
@@ -33,13 +34,13 @@ def further(client: Client, study_id: str, verb: str, **arguments: Any) -> dict[
         return client.request("POST", f"{study_path(study_id)}:{verb}", key="", **arguments)
 
 
-def submitted(client: Client, study: dict[str, Any], wait: bool, timeout: float | None, as_json: bool) -> None:
+def submitted(client: Client, study: dict[str, Any], wait: bool, timeout: float | None) -> None:
     """Tell of a study that was submitted, at once or when it has ended."""
     with outlived(study["id"]):
         say(*warning_lines(study.get("warnings", ()), study.get("warning_codes", ())))
         if wait:
             study = follow(client, study["id"], timeout)
-    show_study(study, as_json)
+    show_study(study)
     if wait:
         exit_as(study)
 
@@ -76,8 +77,8 @@ def outlived(study_id: str) -> Iterator[None]:
     except KeyboardInterrupt:
         say(
             _(
-                "The study {study} continues without this command: `sprag watch {study}` follows it, `sprag cancel "
-                "{study}` ends it.",
+                "The study {study} continues without this command: `sprag study watch {study}` follows it, `sprag "
+                "study cancel {study}` ends it.",
                 study=study_id,
             )
         )
@@ -115,9 +116,9 @@ def exit_as(study: dict[str, Any]) -> None:
         raise typer.Exit(ExitCode.NOT_ALL_OK)
 
 
-def show_study(study: dict[str, Any], as_json: bool) -> None:
+def show_study(study: dict[str, Any]) -> None:
     """Print the current study: its id and progress, or everything as JSON."""
-    if as_json:
+    if wants_json():
         write_json(study)
         return
     print(study["id"])

@@ -1,24 +1,124 @@
-"""Commands in groups, whose help lists them under their titles."""
+"""Commands in groups, each loaded when it is used; help lists them under their titles."""
 
 from __future__ import annotations
 
-from typing import Any, Final
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from importlib import import_module
+from typing import Any, Final, NamedTuple
 
+import typer
 from typer.core import TyperGroup
+from typer.main import get_command_from_info, get_group_from_info
+from typer.models import CommandInfo, TyperInfo
 
 #: Longest first sentence of a help text.
 _SENTENCE: Final = 400
+#: Options of every command, which may stand anywhere in the line, and how many values each has.
+_ANYWHERE: Final = {"--json": 0, "--server": 1, "--token": 1}
+#: Options before the command that have a value.
+_BEFORE: Final = ("--language",)
+
+
+class Word(NamedTuple):
+    """A command: its heading in the help, where it is (``module:name`` below this package), and what it does."""
+
+    title: str
+    place: str
+    summary: str
+
+
+class LazyCommands(Mapping[str, Any]):
+    """Commands by name, each loaded when it is asked for and completed by ``finish``."""
+
+    def __init__(self, words: Mapping[str, Word], finish: Callable[[Any], None]) -> None:
+        self.words, self._finish = words, finish
+        self._loaded: dict[str, Any] = {}
+
+    def __getitem__(self, name: str) -> Any:
+        """A command; KeyError where there is none."""
+        if name not in self._loaded:
+            word = self.words[name]
+            module, _, attribute = word.place.partition(":")
+            self._loaded[name] = made(name, getattr(import_module(f"{__package__}.{module}"), attribute))
+            self._finish(self._loaded[name])
+        return self._loaded[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """The names in their order."""
+        return iter(self.words)
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self.words)
+
+
+def made(name: str, source: Callable[..., None] | typer.Typer) -> Any:
+    """The command of a function, or the group of an application of typer."""
+    if isinstance(source, typer.Typer):
+        group = get_group_from_info(
+            TyperInfo(source, name=name), suggest_commands=True, pretty_exceptions_short=False, rich_markup_mode=None
+        )
+        _list_once(group, group.params)
+        return group
+    return get_command_from_info(
+        CommandInfo(name, callback=source), pretty_exceptions_short=False, rich_markup_mode=None
+    )
+
+
+def _list_once(group: Any, options: Sequence[Any]) -> None:
+    """Hide options of commands that their group lists."""
+    listed = [(option.name, option.opts) for option in options]
+    for command in group.commands.values():
+        for option in command.params:
+            option.hidden = getattr(option, "hidden", False) or (option.name, option.opts) in listed
+        if hasattr(command, "commands"):
+            _list_once(command, options)
 
 
 class Groups(TyperGroup):
-    """A command with commands; help is plain text, because rich would take as long to load as everything else."""
+    """A command with commands; help is plain text, because rich would take as long to load as everything else.
+
+    The options of a group are those of its commands, listed once: in a command line they belong to the command.
+    """
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put options before the command behind it, except for those of every command."""
+        place = next((place for place, word in enumerate(args) if word in self.commands), 0)
+        return super().parse_args(ctx, args if ctx.parent is None else [*args[place:], *args[:place]])
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002 - typer's signature
         """Write the name and the first sentence of each command."""
         groups: dict[str, list[tuple[str, str]]] = {}
-        for name, command in self.commands.items():
-            title = getattr(command, "rich_help_panel", None) or "Commands"
-            groups.setdefault(title, []).append((name, command.get_short_help_str(limit=_SENTENCE)))
+        for title, name, summary in self.listed():
+            groups.setdefault(title, []).append((name, summary))
         for title, rows in groups.items():
             with formatter.section(title):
                 formatter.write_dl(rows)
+
+    def listed(self) -> Iterator[tuple[str, str, str]]:
+        """Heading, name and summary of each command; those of words that are not loaded stay so."""
+        words = self.commands.words if isinstance(self.commands, LazyCommands) else {}
+        for name in self.commands:
+            if name in words:
+                yield words[name].title, name, words[name].summary
+            else:
+                own = self.commands[name]
+                yield getattr(own, "rich_help_panel", None) or "Commands", name, own.get_short_help_str(limit=_SENTENCE)
+
+
+def common_first(line: Sequence[str]) -> tuple[list[str], list[str]]:
+    """A command line as the options that every command has, wherever they stand, and the command with its own."""
+    front: list[str] = []
+    rest: list[str] = []
+    words = iter(line)
+    for word in words:
+        name, equals, _ = word.partition("=")
+        if word == "--":
+            rest += [word, *words]
+        elif name in _ANYWHERE or (not rest and word.startswith("-")):
+            front.append(word)
+            if not equals and (_ANYWHERE.get(name) or name in _BEFORE):
+                front += [value for value in [next(words, None)] if value is not None]
+        else:
+            rest.append(word)
+    return front, rest

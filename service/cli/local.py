@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sprag_study.service.cli import completion
+from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.configured import read_settings
 from sprag_study.service.cli.console import (
     ExitCode,
@@ -28,7 +29,7 @@ from sprag_study.service.cli.console import (
     write_text,
     wrong_option,
 )
-from sprag_study.service.cli.file_formats import TableFormat, require_csv, require_report, table_format
+from sprag_study.service.cli.file_formats import TableFormOption, require_csv, require_report, table_format
 from sprag_study.service.cli.files import output, read_study, to_file
 from sprag_study.service.cli.options import (
     Appendix,
@@ -36,7 +37,7 @@ from sprag_study.service.cli.options import (
     CsvHeader,
     FinishBy,
     Fresh,
-    JsonFlag,
+    KeptIn,
     OutputFile,
     PointsFile,
     Processes,
@@ -44,7 +45,6 @@ from sprag_study.service.cli.options import (
     TableFiles,
 )
 from sprag_study.service.cli.running import run_parsed
-from sprag_study.service.faults import warned
 from sprag_study.service.languages import N_, _, decimal
 
 if TYPE_CHECKING:
@@ -62,35 +62,11 @@ if TYPE_CHECKING:
 _START_SECONDS = 2.0
 
 
-def validate(spec: SpecFile, points: PointsFile = None, tables: TableFiles = None, as_json: JsonFlag = False) -> None:
-    """Check a spec: report all faults and warnings."""
-    try:
-        parsed = read_study(spec, points, files=tables)
-    except WrongInputError as failure:
-        if not as_json or not failure.faults:
-            raise
-        write_json({"valid": False, **failure.document()})
-        raise typer.Exit(ExitCode.WRONG_INPUT) from failure
-    if as_json:
-        write_json(
-            {
-                "valid": True,
-                "model": parsed.study.model,
-                "name": parsed.study.name,
-                "cases": parsed.study.cases,
-                **warned(parsed.warnings),
-            }
-        )
-        return
-    print(_("{file}: valid, {cases} cases", file=spec, cases=parsed.study.cases))
-    _say_warnings(parsed)
-
-
 def _say_warnings(parsed: ParsedSpec) -> None:
     say(*warning_lines(parsed.warnings))
 
 
-def preview(
+def check(
     spec: SpecFile,
     points: PointsFile = None,
     tables: TableFiles = None,
@@ -99,22 +75,28 @@ def preview(
     ] = None,
     processes: Processes = None,
     finish_by: FinishBy = None,
-    as_json: JsonFlag = False,
 ) -> None:
-    """Preview a study: number of cases, time, size, first cases. Nothing is run."""
+    """Check a spec: every fault and warning, then the number of cases, time and size. Nothing is run."""
     from sprag_study.service.jobs.preview import preview_json
     from sprag_study.worker.chunking import Chunking
 
     finish = _finish(finish_by)
     left = None if finish is None else (finish - datetime.now(UTC)).total_seconds()
     settings = read_settings(database=db, processes=processes)
-    parsed = read_study(spec, points, partial(_with_start, settings) if db is not None else None, tables)
+    try:
+        parsed = read_study(spec, points, partial(_with_start, settings) if db is not None else None, tables)
+    except WrongInputError as failure:
+        if not wants_json() or not failure.faults:
+            raise
+        write_json({"valid": False, **failure.document()})
+        raise typer.Exit(ExitCode.WRONG_INPUT) from failure
     reusable = 0 if db is None else _reusable(settings, parsed)
     chunking = Chunking(0, settings.pool_processes, settings.chunk_timeout)
     made = preview_json(parsed, chunking, reusable, left, _START_SECONDS)
-    if as_json:
-        write_json(made)
+    if wants_json():
+        write_json({"valid": True, **made})
         return
+    print(_("{file}: valid, {cases} cases", file=spec, cases=parsed.study.cases))
     _show_preview(made)
     if reusable:
         write_text(_("{count} of the cases need not be run: the database has them", count=reusable) + "\n")
@@ -170,14 +152,13 @@ def presets(
             autocompletion=completion.presets,
         ),
     ] = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """List the studies that come with the program, or print the spec of one."""
     from sprag_study.service.presets import ABOUT, preset_names, preset_text
 
     names = preset_names()
     if name is None:
-        if as_json:
+        if wants_json():
             write_json({"presets": list(names), "about": {item: asdict(ABOUT[item]) for item in names}})
         else:
             columns = ((_("preset"), False, True), (_("shows"), False))
@@ -188,7 +169,7 @@ def presets(
         detail = _("invalid argument")
         raise wrong_option("NAME", "unknown-name", message, name, allowed=", ".join(names), detail=detail)
     file, text = preset_text(name)
-    if as_json:
+    if wants_json():
         write_json({"name": name, "file": file, "text": text})
     else:
         write_text(text)
@@ -199,25 +180,19 @@ def run(
     points: PointsFile = None,
     tables: TableFiles = None,
     file: OutputFile = None,
-    form: Annotated[
-        TableFormat | None, typer.Option("--format", help="Default: by the ending of FILE; csv where it has none.")
-    ] = None,
+    form: TableFormOption = None,
     header: CsvHeader = None,
     appendix: Appendix = None,
-    db: Annotated[
-        str | None,
-        typer.Option("--db", metavar="URL", help="Database to keep the study in; default: a temporary database."),
-    ] = None,
+    db: KeptIn = None,
     processes: Processes = None,
     chunk: ChunkCases = None,
     fresh: Fresh = False,
     finish_by: FinishBy = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """Run a study here, without a service: rows or a report to standard output or FILE, progress on standard error."""
     from sprag_study.service.results.unaffected import unaffecting
 
-    finish, written = _finish(finish_by), table_format(form, file, as_json)
+    finish, written = _finish(finish_by), table_format(form, file)
     require_csv(header, written)
     require_report(appendix, written)
     settings = read_settings(database=db, processes=processes, chunk_cases=chunk)
@@ -245,7 +220,7 @@ def run(
     say(*warning_lines(without_effect))
     seconds = time.monotonic() - start
     say(", ".join(_done(record, seconds, kept=db is not None)), *_rounds(progress), *ending_lines(endings))
-    if as_json and to_file(file):
+    if wants_json() and to_file(file):
         numbers = {"cases": record.cases, "done": record.done, "ok": record.ok, "reused": record.reused}
         study_id = record.id if db is not None else None
         write_json({"file": file, "study": study_id, **numbers, "endings": endings, "seconds": round(seconds, 3)})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Any, Final
 
 import typer
 
@@ -12,9 +12,6 @@ from sprag_study.service.cli import completion
 from sprag_study.service.formats import Header
 from sprag_study.service.views.study_questions import CHAPTERS
 from sprag_study.worker.limits import MAX_STARTS
-
-#: Default address of `sprag serve`.
-DEFAULT_SERVER = "http://127.0.0.1:8000"
 
 
 class ValueFormat(StrEnum):
@@ -24,9 +21,6 @@ class ValueFormat(StrEnum):
     JSON = "json"
 
 
-JsonFlag = Annotated[
-    bool, typer.Option("--json", help="Data as JSON on standard output, failures as JSON on standard error.")
-]
 SpecFile = Annotated[str, typer.Argument(metavar="SPEC", help="Study spec, JSON or TOML; - reads standard input.")]
 PointsFile = Annotated[
     str | None,
@@ -115,18 +109,15 @@ CurveBy = Annotated[
         "--by", metavar="PATH", help="Axis with one curve for each value.", autocompletion=completion.parameters
     ),
 ]
-Server = Annotated[
-    str, typer.Option("--server", envvar="SPRAG_SERVER", metavar="URL", help="Address of the running service.")
-]
-Token = Annotated[
-    str | None,
-    typer.Option("--token", envvar="SPRAG_TOKEN", metavar="SECRET", help="Token of the service.", show_default=False),
-]
 Database = Annotated[
     str | None,
     typer.Option(
         "--db", metavar="URL", help="Database: path of an SQLite file or SQLAlchemy URL; default: as `sprag serve`."
     ),
+]
+KeptIn = Annotated[
+    str | None,
+    typer.Option("--db", metavar="URL", help="Database to keep the study in; default: a temporary database."),
 ]
 Processes = Annotated[
     int | None, typer.Option("--processes", min=1, max=1024, help="Processes of the pool; default: one for each core.")
@@ -180,3 +171,21 @@ def in_units(units: str | None) -> list[tuple[str, str]]:
 def in_language(language: str | None) -> list[tuple[str, str]]:
     """The language of a picture as a query."""
     return [] if language is None else [("language", language)]
+
+
+#: Options that most views have, by the name of their parameter; the help of `sprag show` lists them once.
+SHARED: Final[dict[str, Any]] = {
+    "file": Annotated[
+        str | None,
+        typer.Option("-o", "--output", metavar="FILE", help="File to write: .csv, .svg, .png, .pdf; .json of a case."),
+    ],
+    "form": ValueFormatOption,
+    "units": FileUnits,
+    "language": PictureLanguage,
+    "case": CaseOption,
+    "start": StartOption,
+    "points_file": PointsFile,
+    "tables": TableFiles,
+    "db": KeptIn,
+    "processes": Processes,
+}

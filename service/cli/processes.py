@@ -9,9 +9,10 @@ from typing import Annotated
 import typer
 
 from sprag_study.service import languages
+from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.configured import read_settings
 from sprag_study.service.cli.console import TroubleError, WrongInputError, write_json
-from sprag_study.service.cli.options import ChunkCases, Database, JsonFlag, Processes
+from sprag_study.service.cli.options import ChunkCases, Database, Processes
 from sprag_study.service.cli.stores import database_of
 
 Host = Annotated[
@@ -35,7 +36,6 @@ def serve(
     chunk: ChunkCases = None,
     tls_certificate: TlsCertificate = None,
     tls_key: TlsKey = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """Start the service and its worker; Ctrl-C ends both. With --json the address is printed on standard output."""
     # What is imported stays: looking for garbage among it would take a fifth of the time of the start.
@@ -63,7 +63,7 @@ def serve(
 
     try:
         with languages.language(languages.ENGLISH):  # of requests and logs, whoever starts the service
-            run_service(settings, announce=announce if as_json else None)
+            run_service(settings, announce=announce if wants_json() else None)
     except (UnsafeSettingsError, CertificateError) as error:
         raise WrongInputError("invalid-settings", str(error)) from error
     except AddressError as error:

@@ -1,10 +1,11 @@
-"""``sprag regimes``: the regimes to which one case comes from its many starts, run here."""
+"""``sprag show ID regimes``: the regimes to which one case comes from its many starts, run here."""
 
 from __future__ import annotations
 
+from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import show_table, write_json, wrong_option
 from sprag_study.service.cli.files import read_study, require_cases
-from sprag_study.service.cli.options import CaseOption, JsonFlag, PointsFile, SpecFile
+from sprag_study.service.cli.options import CaseOption, PointsFile, SpecFile
 from sprag_study.service.languages import N_, _
 
 #: What is shown of each regime.
@@ -14,7 +15,7 @@ _SHOWN = (
 )  # fmt: skip
 
 
-def regimes(spec: SpecFile, case: CaseOption = 0, points: PointsFile = None, as_json: JsonFlag = False) -> None:
+def regimes(spec: SpecFile, case: CaseOption = 0, points: PointsFile = None) -> None:
     """The regimes to which one case comes from its many starts, with their shares."""
     import numpy as np
 
@@ -39,7 +40,7 @@ def regimes(spec: SpecFile, case: CaseOption = 0, points: PointsFile = None, as_
     rows = [
         {name: infos[name][1].cell(float(row[infos[name][0]])) for name in _SHOWN} for row in (done.values[0], *further)
     ]
-    if as_json:
+    if wants_json():
         write_json({"case": case, "ending": done.endings[0], "regimes": rows})
         return
     show_table(

@@ -8,9 +8,9 @@ from urllib.parse import urlsplit
 
 import typer
 
+from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import say, show_table, write_json, wrong_option
 from sprag_study.service.cli.groups import Groups
-from sprag_study.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, Token
 from sprag_study.service.cli.remote import connection
 from sprag_study.service.languages import N_, _
 
@@ -23,14 +23,11 @@ _STUDY_PAGE = re.compile(r".*/studies/(?P<study>[^/]+)/(?P<page>[a-z]+)")
 @app.command("list")
 def list_views(
     study: Annotated[str | None, typer.Option("--study", metavar="ID", help="Only the views of this study.")] = None,
-    server: Server = DEFAULT_SERVER,
-    token: Token = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """List saved views: figures of reports in order, then the others by name."""
-    with connection(server, token) as client:
+    with connection() as client:
         found = client.request("GET", "/views", params={} if study is None else {"study": study})
-    if as_json:
+    if wants_json():
         write_json(found)
         return
     columns = ((_("id"), False, True), (_("figure"), True), (_("name"), False), (_("address"), False))
@@ -48,14 +45,11 @@ def save(
     report: Annotated[
         bool, typer.Option("--report", help="Also make these curves or this map a figure of the study's report.")
     ] = False,
-    server: Server = DEFAULT_SERVER,
-    token: Token = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """Save the address of a page under a name."""
     body = {**_place(address), "name": name, "in_report": report}
-    with connection(server, token) as client:
-        _show(client.request("POST", "/views", json=body), as_json)
+    with connection() as client:
+        _show(client.request("POST", "/views", json=body))
 
 
 @app.command()
@@ -68,23 +62,20 @@ def change(
     place: Annotated[
         int | None, typer.Option("--place", metavar="N", help="Its place among the figures of the report, from 1.")
     ] = None,
-    server: Server = DEFAULT_SERVER,
-    token: Token = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """Rename a view, or change whether and where it is in the report of its study."""
     from sprag_study.service.client.wire import view_path
 
     given = {"name": name, "in_report": report, "place": place}
     fields = {key: value for key, value in given.items() if value is not None}
-    with connection(server, token) as client:
-        _show(client.request("PATCH", view_path(view_id), json=fields), as_json)
+    with connection() as client:
+        _show(client.request("PATCH", view_path(view_id), json=fields))
 
 
 @app.command()
-def delete(view_id: ViewId, server: Server = DEFAULT_SERVER, token: Token = None) -> None:
+def delete(view_id: ViewId) -> None:
     """Delete a saved view."""
-    with connection(server, token) as client:
+    with connection() as client:
         client.delete_view(view_id)
 
 
@@ -107,8 +98,8 @@ def _place(address: str) -> dict[str, Any]:
     )
 
 
-def _show(saved: dict[str, Any], as_json: bool) -> None:
-    if as_json:
+def _show(saved: dict[str, Any]) -> None:
+    if wants_json():
         write_json(saved)
         return
     named = f"{saved['id']}: {saved['name']}"

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import typer
 
 from sprag_study.service.cli import completion
+from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import ExitCode, WrongInputError, say, show_table, write_json, wrong_option
+from sprag_study.service.cli.described import listing
 from sprag_study.service.cli.files import read_spec
 from sprag_study.service.cli.groups import Groups
 from sprag_study.service.cli.names import schedule_of
-from sprag_study.service.cli.options import DEFAULT_SERVER, Fresh, JsonFlag, Server, SpecFile, Token
+from sprag_study.service.cli.options import Fresh, SpecFile
 from sprag_study.service.cli.remote import PriorityOption, connection
 from sprag_study.service.languages import N_, _, earlier
 from sprag_study.worker.limits import MAX_PRIORITY
@@ -115,6 +117,14 @@ Name = Annotated[
 ]
 
 
+_SHARED: Final = {
+    "cron": Cron, "at": At, "zone": Zone, "window": WindowOption, "name": Name, "finish_by": RunFinish,
+    "overlap": Overlap, "catch_up": CatchUp, "misfire_grace": Grace, "trouble_flag": TroubleFlags, "email": Email,
+    "webhook": Webhook, "report": ReportWhen,
+}  # fmt: skip
+app.callback()(listing(**_SHARED))
+
+
 @app.command()
 def add(
     spec: SpecFile,
@@ -137,9 +147,6 @@ def add(
         str | None,
         typer.Option("--key", metavar="KEY", help="Idempotency key: the same key creates one schedule."),
     ] = None,
-    server: Server = DEFAULT_SERVER,
-    token: Token = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """Create a schedule for a study and print its id: recurring with --cron, once with --at."""
     fields: dict[str, Any] = {
@@ -150,16 +157,16 @@ def add(
         "priority": priority,
         "fresh": fresh,
     }
-    with connection(server, token) as client:
-        _show(client.request("POST", "/schedules", json=fields, key=key or ""), as_json)
+    with connection() as client:
+        _show(client.request("POST", "/schedules", json=fields, key=key or ""))
 
 
 @app.command("list")
-def list_schedules(server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False) -> None:
+def list_schedules() -> None:
     """List the schedules with their last and their next run."""
-    with connection(server, token) as client:
+    with connection() as client:
         found = client.request("GET", "/schedules")
-    if as_json:
+    if wants_json():
         write_json(found)
         return
     heads = (_("id"), _("when"), _("window"), _("finish by"), _("last run"), _("next run"), _("name"))
@@ -173,18 +180,16 @@ def list_schedules(server: Server = DEFAULT_SERVER, token: Token = None, as_json
 
 
 @app.command()
-def show(
-    schedule_id: ScheduleId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False
-) -> None:
+def show(schedule_id: ScheduleId) -> None:
     """Show a schedule and the outcome of its latest due times; with --json also its spec."""
     from sprag_study.service.client.wire import schedule_path
 
-    with connection(server, token) as client:
+    with connection() as client:
         schedule = client.request("GET", schedule_path(schedule_of(client, schedule_id)))
-    if as_json:
+    if wants_json():
         write_json(schedule)
         return
-    _show(schedule, as_json)
+    _show(schedule)
     columns = ((_("due"), False), (_("missed before"), True), (_("study"), False, True), (_("problem"), False))
     show_table(
         "", columns, [(_clock(r["due_local"]), r["missed"], r["study"], _known(r["problem"])) for r in schedule["runs"]]
@@ -194,14 +199,11 @@ def show(
 @app.command()
 def night(
     hours: Annotated[float, typer.Option("--hours", min=1, max=744, help="Hours to look back on.")] = 24,
-    server: Server = DEFAULT_SERVER,
-    token: Token = None,
-    as_json: JsonFlag = False,
 ) -> None:
-    """Show what schedules did in the last hours, first what needs attention; exit code 1 if anything does."""
-    with connection(server, token) as client:
+    """Show what schedules did in the last hours, first what needs attention; exit code 4 if anything does."""
+    with connection() as client:
         found = client.request("GET", "/night", params={"hours": hours})
-    if as_json:
+    if wants_json():
         write_json(found)
     else:
         columns = ((_("due"), False), (_("schedule"), False), (_("outcome"), False), (_("study"), False, True))
@@ -239,9 +241,6 @@ def change(
     email: Email = None,
     webhook: Webhook = None,
     report: ReportWhen = None,
-    server: Server = DEFAULT_SERVER,
-    token: Token = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """Change the given fields of a schedule; the others are kept."""
     fields = _given(
@@ -254,7 +253,7 @@ def change(
         raise WrongInputError(
             "invalid-parameter", _("nothing to change; `sprag schedule change --help` lists the fields")
         )
-    _change(schedule_id, fields, server, token, as_json)
+    _change(schedule_id, fields)
 
 
 @app.command()
@@ -264,38 +263,33 @@ def pause(
         str | None,
         typer.Option("--until", metavar="TIME", help="Resume by itself then, such as 2027-01-07T00:00 in its zone."),
     ] = None,
-    server: Server = DEFAULT_SERVER,
-    token: Token = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """Pause a schedule: it stays, but is not due, until somebody resumes it or until a certain time."""
-    _change(schedule_id, {"enabled": False} if until is None else {"paused_until": until}, server, token, as_json)
+    _change(schedule_id, {"enabled": False} if until is None else {"paused_until": until})
 
 
 @app.command()
-def resume(
-    schedule_id: ScheduleId, server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False
-) -> None:
+def resume(schedule_id: ScheduleId) -> None:
     """Resume a paused schedule from now on."""
-    _change(schedule_id, {"enabled": True, "paused_until": None}, server, token, as_json)
+    _change(schedule_id, {"enabled": True, "paused_until": None})
 
 
 @app.command()
-def delete(schedule_id: ScheduleId, server: Server = DEFAULT_SERVER, token: Token = None) -> None:
+def delete(schedule_id: ScheduleId) -> None:
     """Delete a schedule; its studies are kept."""
     from sprag_study.service.client.wire import schedule_path
 
-    with connection(server, token) as client:
+    with connection() as client:
         schedule_id = schedule_of(client, schedule_id)
         client.delete(schedule_path(schedule_id))
     say(_("{what} is deleted", what=schedule_id))
 
 
-def _change(schedule_id: str, fields: Mapping[str, Any], server: str, token: str | None, as_json: bool) -> None:
+def _change(schedule_id: str, fields: Mapping[str, Any]) -> None:
     from sprag_study.service.client.wire import schedule_path
 
-    with connection(server, token) as client:
-        _show(client.request("PATCH", schedule_path(schedule_of(client, schedule_id)), json=dict(fields)), as_json)
+    with connection() as client:
+        _show(client.request("PATCH", schedule_path(schedule_of(client, schedule_id)), json=dict(fields)))
 
 
 def _given(**fields: Any) -> dict[str, Any]:
@@ -328,8 +322,8 @@ def _window(text: str | None) -> dict[str, Any]:
     return {"window": [begin.strip(), end.strip()]}
 
 
-def _show(schedule: dict[str, Any], as_json: bool) -> None:
-    if as_json:
+def _show(schedule: dict[str, Any]) -> None:
+    if wants_json():
         write_json(schedule)
         return
     print(schedule["id"])

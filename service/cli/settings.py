@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Final
 
+from sprag_study.service.cli.common import DEFAULT_SERVER, wants_json
 from sprag_study.service.cli.configured import read_settings
 from sprag_study.service.cli.console import WrongInputError, show_table, write_json
-from sprag_study.service.cli.options import DEFAULT_SERVER, JsonFlag
 from sprag_study.service.faults import Fault
 from sprag_study.service.languages import N_, _
 
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 #: Environment variables that are not settings of the service, each with its meaning.
 VARIABLES: Final = {
     "SPRAG_SETTINGS": "path of a TOML file with settings",
-    "SPRAG_SERVER": "address of the service that `submit`, `watch`, `list`, `curve` and the like use; "
-    f"`{DEFAULT_SERVER}` unless set",
+    "SPRAG_SERVER": "address of the service that commands ask; that of `sprag login`, or "
+    f"`{DEFAULT_SERVER}`, unless set",
     "SPRAG_KERNEL_CACHE": "folder of the compiled kernels; the user's cache folder unless set",
     "SPRAG_COMPILER": "`plain` compiles kernels by numba's documented interface alone, for a minute instead of "
     "seconds, with the same results ([porting-numba.md](porting-numba.md)); `programs` unless set",
@@ -38,13 +38,13 @@ def _cells(row: EffectiveSetting) -> tuple[str, ...]:
     return row.name, value, _("default") if row.origin == DEFAULT_ORIGIN else row.origin
 
 
-def settings(as_json: JsonFlag = False) -> None:
+def settings() -> None:
     """Show the settings that apply here, each with its origin: a variable of the environment, a file, the default."""
     found = read_settings()
     from sprag_study.service.settings import effective
 
     rows = [*effective(found), *_of_commands()]
-    if as_json:
+    if wants_json():
         write_json({"settings": [asdict(row) for row in rows]})
     else:
         show_table("", ((_("setting"), False, True), (_("value"), False), (_("origin"), False)), map(_cells, rows))

@@ -1,4 +1,4 @@
-"""``sprag settle``: the settled motions of cases."""
+"""``sprag show ID settled``: the settled motions of cases."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import ExitCode, progress_bar, say, show_table, write_json, wrong_option
 from sprag_study.service.cli.files import output, read_study, require_cases, to_file
-from sprag_study.service.cli.options import JsonFlag, OutputFile, PointsFile, SpecFile
+from sprag_study.service.cli.options import OutputFile, PointsFile, SpecFile
 from sprag_study.service.json_text import to_bytes
 from sprag_study.service.languages import N_, _
 from sprag_study.worker.limits import MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
@@ -43,7 +44,6 @@ def settle(
             help="Excitation periods after which a search ends; default: the spec's, or 1000.",
         ),
     ] = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """Find the settled motions of cases, with many starts all: regime, order, stability and characteristics."""
     from sprag_study.service.exports import Source, csv_pieces, rows_json
@@ -54,7 +54,7 @@ def settle(
     cases = _chosen(study, case)
     with output(file) as write:
         blocks = _blocks(study, cases)
-        if as_json or (file or "").lower().endswith(".json"):
+        if wants_json() or (file or "").lower().endswith(".json"):
             write(to_bytes([row for block in blocks for row in rows_json(study, block)]) + b"\n")
         elif len(cases) == 1 and not to_file(file):
             _show(blocks[0], count_of(study.run))
@@ -64,7 +64,7 @@ def settle(
     endings = Counter(ending for block in blocks for ending in block.first_rows().endings)
     regimes = Counter(row.results["regime"] for block in blocks for row in block.rows() if row.ending == OK)
     say(", ".join(f"{count} {regime}" for regime, count in regimes.most_common()) or _("no case ended ok"))
-    if as_json and to_file(file):
+    if wants_json() and to_file(file):
         write_json({"file": file, "cases": len(cases), "regimes": dict(regimes), "endings": dict(endings)})
     if set(endings) != {OK}:
         raise typer.Exit(ExitCode.NOT_ALL_OK)

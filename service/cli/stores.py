@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.configured import read_settings
 from sprag_study.service.cli.console import WrongInputError, say
 from sprag_study.service.languages import _
@@ -26,7 +27,7 @@ def database_of(db: str | None) -> str:
     file = file_of(url)
     if file is not None and not file.exists():
         missing = _(
-            "{file}: there is no database; `sprag serve`, `sprag run --db` and `sprag db upgrade` create one",
+            "{file}: there is no database; `sprag serve`, `sprag run --db` and `sprag admin db upgrade` create one",
             file=file.absolute(),
         )
         raise WrongInputError("invalid-file", missing)
@@ -41,9 +42,9 @@ def store_of(db: str | None) -> Store:
 
 
 @contextmanager
-def named_store(db: str | None, *, quiet: bool) -> Iterator[Store]:
-    """The store of that database, which is named before the answer unless ``quiet``: JSON has it as ``database``."""
+def named_store(db: str | None) -> Iterator[Store]:
+    """The store of that database, which is named before the answer unless it is in the JSON."""
     with store_of(db) as store:
         yield store
-        if not quiet:
+        if not wants_json():
             say(_("database {database}:", database=store.session.location))

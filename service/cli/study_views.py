@@ -1,4 +1,4 @@
-"""``sprag curve``, ``map``, ``answers``, ``explore`` and their like: the views of a study, run here or of a service.
+"""``sprag show ID curves``, ``map``, ``answers`` and their like: the views of a study, run here or of a service.
 
 Their options are the settings of the views (`sprag_study.service.views.study_questions`); nothing else is loaded before
 one runs.
@@ -7,39 +7,24 @@ one runs.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from inspect import Signature
-from typing import TYPE_CHECKING, Any, Final, cast
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any, Final, cast
+
+import typer
 
 from sprag_study.service import languages
-from sprag_study.service.cli.case_views import (
-    SpecOrStudy,
-    is_study,
-    naming_options,
-    option,
-    parameter,
-    query_of,
-    require_language,
-    say_file,
-)
+from sprag_study.service.cli.case_views import SpecOrStudy, is_study, naming_options, require_language, say_file
+from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.configured import read_settings
-from sprag_study.service.cli.console import say, warning_lines, write_json, wrong_option
-from sprag_study.service.cli.file_formats import PICTURES, file_format
-from sprag_study.service.cli.files import read_study, write_pieces
+from sprag_study.service.cli.console import WrongInputError, say, warning_lines, write_json, wrong_option
+from sprag_study.service.cli.described import option, parameter, query_of, signed
+from sprag_study.service.cli.file_formats import file_format
+from sprag_study.service.cli.files import MAX_DATA_BYTES, decode, read_bytes, read_study, write_pieces
 from sprag_study.service.cli.names import study_of
-from sprag_study.service.cli.options import (
-    DEFAULT_SERVER,
-    FileUnits,
-    JsonFlag,
-    PictureLanguage,
-    Server,
-    TableOrPicture,
-    Token,
-    in_language,
-    in_units,
-)
+from sprag_study.service.cli.options import SHARED, in_language, in_units
 from sprag_study.service.cli.remote import connection
 from sprag_study.service.cli.running import run_parsed
 from sprag_study.service.cli.shown import (
@@ -53,16 +38,25 @@ from sprag_study.service.cli.shown import (
     show_sensitivity,
     show_yield,
 )
+from sprag_study.service.cli.stores import store_of
+from sprag_study.service.faults import Fault
+from sprag_study.service.formats import PICTURES
 from sprag_study.service.languages import N_, _
 from sprag_study.service.reading.numbers import probability_of
 from sprag_study.service.views import study_questions as questions
 from sprag_study.service.views.setting import settings_of
 
 if TYPE_CHECKING:
+    from sprag_study.service.spec.document import ParsedSpec
+    from sprag_study.service.storage.studies.records import Progress
     from sprag_study.service.views.setting import NamedSetting, ViewInfo
 
 #: Formats of their files.
 _FORMATS: Final = ("csv", *PICTURES)
+_Measured = Annotated[
+    str | None,
+    typer.Option("--measured", metavar="FILE", help="CSV file of measured points, instead of those of the spec."),
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +75,7 @@ class Command:
 
 _COMMANDS: Final = (
     Command("answers", questions.ANSWERS, show_answers),
-    Command("curve", questions.CURVES, lambda found, _model: show_curves(found)),
+    Command("curves", questions.CURVES, lambda found, _model: show_curves(found)),
     Command("explore", questions.EXPLORE, lambda found, _model: show_cases(found), 20),
     Command("front", questions.FRONT, lambda found, _model: show_designs(found), 20),
     Command("calibration", questions.CALIBRATION, lambda found, _model: show_calibration(found)),
@@ -106,8 +100,8 @@ def _made(command: Command) -> Callable[..., None]:
     asked = settings_of(about.question)
 
     def run(
-        study: str, file: str | None, units: str | None, language: str | None, server: str, token: str | None,
-        as_json: bool, **settings: Any,
+        study: str, file: str | None, units: str | None, language: str | None, db: str | None, processes: int | None,
+        measured: str | None = None, **settings: Any,
     ) -> None:  # fmt: skip
         form = None if file is None else file_format(file, _FORMATS)
         if settings.get("quantiles"):
@@ -118,35 +112,39 @@ def _made(command: Command) -> Callable[..., None]:
             settings = {**settings, "limit": settings["limit"] or command.few}
             whole = {**settings, "limit": most}
         drawing = dict([*in_units(units), *in_language(language)])
-        opened = (
-            _remote(study, server, token, about, asked, drawing)
-            if is_study(study)
-            else _local(study, about, asked, settings, drawing)
-        )
+        if is_study(study):
+            opened = _remote(study, about, asked, drawing)
+        else:
+            if db is not None:
+                store_of(db).close()
+            change = None if measured is None else partial(_with_measured, measured)
+            opened = _local(read_study(study, None, change), about, asked, settings, drawing, db, processes)
         with opened as source:
             found = source.answer(settings)
             if file is not None and form is not None:
                 write_pieces(file, source.pieces(whole, form))
-            if as_json:
+            if wants_json():
                 write_json(found)
             else:
                 command.show(found, source.model)
         if file is not None:
             say_file(file, form, None if most is None or found.get("selected", 0) <= most else most)
 
-    run.__doc__ = about.summary
     own = [
         parameter(one.name, option(one), None if one.name == "limit" and command.few else one.default) for one in asked
     ]
-    run.__signature__ = Signature(  # type: ignore[attr-defined]
-        [
-            parameter("study", SpecOrStudy, ...), *own, parameter("file", TableOrPicture, None),
-            parameter("units", FileUnits, None), parameter("language", PictureLanguage, None),
-            parameter("server", Server, DEFAULT_SERVER), parameter("token", Token, None),
-            parameter("as_json", JsonFlag, False),
-        ]
-    )  # fmt: skip
-    return run
+    own += [parameter("measured", _Measured, None)] if about is questions.CALIBRATION else []
+    shared = [parameter(name, SHARED[name], None) for name in ("file", "units", "language", "db", "processes")]
+    return signed(run, about.summary, [parameter("study", SpecOrStudy, ...), *own, *shared])
+
+
+def _with_measured(file: str, spec: object) -> object:
+    """The spec of a calibration with the measured points of a CSV file instead of its own."""
+    calibration = spec.get("calibrate") if isinstance(spec, Mapping) else None
+    if not isinstance(spec, Mapping) or not isinstance(calibration, Mapping):
+        problem = Fault("/calibrate", "required", N_("is required"), None, _("unknown parameters and measured points"))
+        raise WrongInputError("invalid-spec", _("{file}: not a calibration", file=file), [problem])
+    return {**spec, "calibrate": {**calibration, "measured": {"csv": decode(file, read_bytes(file, MAX_DATA_BYTES))}}}
 
 
 def _most_rows(question: type) -> int | None:
@@ -164,14 +162,19 @@ def _probability(text: str) -> float:
     return value
 
 
+def _remark(now: Progress) -> str:
+    """What is known of a study that chooses its own cases, beside its bar."""
+    from sprag_study.service.results.rounds import sentence
+
+    return sentence(now.rounds, now.state) if now.rounds else ""
+
+
 @contextmanager
-def _remote(
-    text: str, server: str, token: str | None, about: ViewInfo, asked: tuple[NamedSetting, ...], drawing: dict[str, str]
-) -> Iterator[_Source]:
+def _remote(text: str, about: ViewInfo, asked: tuple[NamedSetting, ...], drawing: dict[str, str]) -> Iterator[_Source]:
     """The view of a study of a running service."""
     from sprag_study.service.client.wire import study_path
 
-    with connection(server, token) as client:
+    with connection() as client:
         path = study_path(study_of(client, text))
         view = f"{path}/{about.name}"
 
@@ -188,8 +191,9 @@ def _remote(
 
 @contextmanager
 def _local(
-    path: str, about: ViewInfo, asked: tuple[NamedSetting, ...], first: dict[str, Any], drawing: dict[str, str]
-) -> Iterator[_Source]:
+    parsed: ParsedSpec, about: ViewInfo, asked: tuple[NamedSetting, ...], first: dict[str, Any],
+    drawing: dict[str, str], db: str | None, processes: int | None,
+) -> Iterator[_Source]:  # fmt: skip
     """The view of the study of a spec, which is run here first."""
     from sprag_study.service.reading.quantities import SI
     from sprag_study.service.reading.reader import CAPTIONS, Choice, reading_for
@@ -197,7 +201,6 @@ def _local(
     from sprag_study.service.views.studies import STUDY_VIEWS
     from sprag_study.service.views.study_view import StudyAnswer, found, is_drawn, written
 
-    parsed = read_study(path)
     say(*warning_lines(parsed.warnings))
     view = STUDY_VIEWS[about.name]
     choice = Choice(drawing.get("units", SI), CAPTIONS)
@@ -223,7 +226,8 @@ def _local(
             with languages.language(drawing.get("language", languages.ENGLISH)):
                 return written(view, answer, choice, study.name or study.model, form)
 
-    with run_parsed(parsed, read_settings(), lambda _now: "", db=None, processes=None) as done:
+    settings = read_settings(database=db, processes=processes)
+    with run_parsed(parsed, settings, _remark, db=db, processes=processes) as done:
         library, study = Library(done.store), done.store.studies.study(done.record.id)
         yield _Source(
             lambda settings: cast("dict[str, Any]", json.loads(file_of(settings, "json"))),

@@ -1,4 +1,4 @@
-"""``sprag token``: create, list and revoke tokens."""
+"""``sprag admin token``: create, list and revoke tokens."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import typer
 
 from sprag_study.service.cli import completion
+from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import WrongInputError, say, show_table, write_json
 from sprag_study.service.cli.groups import Groups
 from sprag_study.service.cli.names import token_of, user_of
-from sprag_study.service.cli.options import Database, JsonFlag
+from sprag_study.service.cli.options import Database
 from sprag_study.service.cli.user import users_of
 from sprag_study.service.languages import N_, _
 from sprag_study.service.storage.people.scopes import TokenScope, TokenState, token_name
@@ -37,12 +38,12 @@ app = typer.Typer(
 
 
 @app.callback()
-def token(context: typer.Context, as_json: JsonFlag = False) -> None:
+def token(context: typer.Context) -> None:
     """Create, list and revoke tokens; without a command: print a secret for SPRAG_TOKEN, which is not stored."""
     if context.invoked_subcommand is not None:
         return
     made = secrets.token_urlsafe(32)
-    if as_json:
+    if wants_json():
         write_json({"token": made})
     else:
         print(made)
@@ -70,14 +71,13 @@ def create(
         ),
     ] = None,
     db: Database = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """Create a token and print it; only its digest is stored, so it cannot be shown again."""
-    with users_of(db, as_json) as store:
+    with users_of(db) as store:
         ends = None if expires is None else store.clock.now() + timedelta(days=expires)
         owner = None if user is None else user_of(store.people, user, "--user")
         secret, record = store.people.create_token(token_name(name, "--name"), scope, owner=owner, expires_at=ends)
-    if as_json:
+    if wants_json():
         write_json({"database": store.session.location, "token": secret, **_json(record)})
     else:
         print(secret)
@@ -86,14 +86,14 @@ def create(
 
 
 @app.command("list")
-def list_tokens(db: Database = None, as_json: JsonFlag = False) -> None:
+def list_tokens(db: Database = None) -> None:
     """List all tokens with owner, state, expiry and last use, newest first, without their secrets."""
-    with users_of(db, as_json) as store:
+    with users_of(db) as store:
         now, users = store.clock.now(), {user.name: user for user in store.people.users()}
         records = store.people.tokens()
     states = [record.state_at(now, users.get(record.owner or "")) for record in records]
     found = [{**_json(record), "state": state.value} for record, state in zip(records, states, strict=True)]
-    if as_json:
+    if wants_json():
         write_json({"database": store.session.location, "tokens": found})
         return
     fields = ("id", "name", "user", "scope", "state", "created_at", "expires_at", "used_at", "revoked_at")
@@ -110,22 +110,21 @@ def revoke(
         str,
         typer.Argument(
             metavar="ID",
-            help="Id or name of the token, or the beginning of one, as `sprag token list` shows them.",
+            help="Id or name of the token, or the beginning of one, as `sprag admin token list` shows them.",
             autocompletion=completion.tokens,
         ),
     ],
     db: Database = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """Revoke a token and end the browser sessions that it started, within two seconds."""
     from sprag_study.service.storage.errors import TokenNotFoundError
 
-    with users_of(db, as_json) as store:
+    with users_of(db) as store:
         try:
             record = store.people.revoke_token(token_of(store.people, token_id))
         except TokenNotFoundError as error:
             raise WrongInputError("token-not-found", str(error)) from error
-    if as_json:
+    if wants_json():
         write_json({"database": store.session.location, **_json(record)})
     else:
         say(_("{token} ({name}) is revoked", token=record.id, name=record.name))

@@ -1,4 +1,4 @@
-"""``sprag user``: add, list, change and remove users of the database."""
+"""``sprag admin user``: add, list, change and remove users of the database."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ import typer
 
 from sprag_study.service.actor import Role
 from sprag_study.service.cli import completion
+from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import WrongInputError, say, show_table, time_text, write_json
 from sprag_study.service.cli.groups import Groups
 from sprag_study.service.cli.names import user_of
-from sprag_study.service.cli.options import Database, JsonFlag
+from sprag_study.service.cli.options import Database
 from sprag_study.service.cli.stores import named_store
 from sprag_study.service.faults import FaultError
 from sprag_study.service.languages import _
@@ -70,15 +71,13 @@ def add(
     storage: Storage = None,
     checks: Checks = None,
     db: Database = None,
-    as_json: JsonFlag = False,
 ) -> None:
-    """Add a user, who logs in with a token (`sprag token create --user`) or through a trusted proxy."""
-    with users_of(db, as_json) as store:
+    """Add a user, who logs in with a token (`sprag admin token create --user`) or through a trusted proxy."""
+    with users_of(db) as store:
         record = store.people.add_user(user_name(name, "NAME"), role or Role.DESIGNER, _quota(cases, storage, checks))
     _show(
         store,
         record,
-        as_json,
         _(
             "{name} is a user: {role}; every request to a service of this database now needs a token",
             name=record.name,
@@ -88,12 +87,12 @@ def add(
 
 
 @app.command("list")
-def list_users(db: Database = None, as_json: JsonFlag = False) -> None:
+def list_users(db: Database = None) -> None:
     """List all users with their roles, their quotas and the use of the quotas."""
-    with users_of(db, as_json) as store:
+    with users_of(db) as store:
         found = [(record, store.people.usage(record.name)) for record in store.people.users()]
         where = {"database": store.session.location}
-    if as_json:
+    if wants_json():
         write_json({**where, "users": [{**_json(u), "cases": used.cases, "bytes": used.bytes} for u, used in found]})
         return
     limit = _("limit")
@@ -117,35 +116,35 @@ def change(
     storage: Storage = None,
     checks: Checks = None,
     db: Database = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """Change the role or the quotas of a user, within two seconds; options that are not given keep their values."""
     if role is None and cases is None and storage is None and checks is None:
-        raise WrongInputError("invalid-parameter", _("nothing to change; `sprag user change --help` lists the options"))
-    with users_of(db, as_json) as store:
+        raise WrongInputError(
+            "invalid-parameter", _("nothing to change; `sprag admin user change --help` lists the options")
+        )
+    with users_of(db) as store:
         record = store.people.change_user(user_of(store.people, name), role, _quota(cases, storage, checks))
-    _show(store, record, as_json, _("{name} is changed: {role}", name=record.name, role=record.role))
+    _show(store, record, _("{name} is changed: {role}", name=record.name, role=record.role))
 
 
 @app.command()
-def remove(name: Known, db: Database = None, as_json: JsonFlag = False) -> None:
+def remove(name: Known, db: Database = None) -> None:
     """Remove a user, whose tokens and sessions end within two seconds; studies and schedules are kept."""
-    with users_of(db, as_json) as store:
+    with users_of(db) as store:
         record = store.people.change_user(user_of(store.people, name), removed=True)
     _show(
         store,
         record,
-        as_json,
-        _("{name} is removed; `sprag user hand-over` gives what they owned to another user", name=record.name),
+        _("{name} is removed; `sprag admin user hand-over` gives what they owned to another user", name=record.name),
     )
 
 
 @app.command()
-def restore(name: Known, db: Database = None, as_json: JsonFlag = False) -> None:
+def restore(name: Known, db: Database = None) -> None:
     """Let a removed user in again, with the same tokens."""
-    with users_of(db, as_json) as store:
+    with users_of(db) as store:
         record = store.people.change_user(user_of(store.people, name), removed=False)
-    _show(store, record, as_json, _("{name} is a user again: {role}", name=record.name, role=record.role))
+    _show(store, record, _("{name} is a user again: {role}", name=record.name, role=record.role))
 
 
 @app.command("hand-over")
@@ -161,13 +160,12 @@ def hand_over(
         ),
     ],
     db: Database = None,
-    as_json: JsonFlag = False,
 ) -> None:
     """Give the studies and schedules of one user to another."""
-    with users_of(db, as_json) as store:
+    with users_of(db) as store:
         name, to = user_of(store.people, name), user_of(store.people, to, "--to")
         studies, schedules = store.people.hand_over(name, to)
-    if as_json:
+    if wants_json():
         write_json({"database": store.session.location, "studies": studies, "schedules": schedules})
     else:
         counts = {"studies": studies, "schedules": schedules}
@@ -175,13 +173,15 @@ def hand_over(
 
 
 @contextmanager
-def users_of(db: str | None, as_json: bool) -> Iterator[Store]:
+def users_of(db: str | None) -> Iterator[Store]:
     """The store of a database; an unknown user, one who exists already, and a wrong name are wrong input."""
     from sprag_study.service.storage.errors import UserExistsError, UserNotFoundError
 
-    with named_store(db, quiet=as_json) as store:
+    with named_store(db) as store:
         try:
             yield store
+        except WrongInputError:
+            raise
         except UserNotFoundError as error:
             raise WrongInputError("user-not-found", str(error)) from error
         except UserExistsError as error:
@@ -196,8 +196,8 @@ def _quota(cases: int | None, storage: int | None, checks: int | None) -> Quota:
     return Quota(cases, None if storage is None else storage * 2**20, checks)
 
 
-def _show(store: Store, record: UserRecord, as_json: bool, sentence: str) -> None:
-    if as_json:
+def _show(store: Store, record: UserRecord, sentence: str) -> None:
+    if wants_json():
         write_json({"database": store.session.location, **_json(record)})
     else:
         say(sentence)

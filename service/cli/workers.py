@@ -1,11 +1,11 @@
-"""``sprag workers``: the processes that run cases, by host."""
+"""``sprag admin workers``: the processes that run cases, by host."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import Column, say, show_table, time_text, write_json
-from sprag_study.service.cli.options import DEFAULT_SERVER, JsonFlag, Server, Token
 from sprag_study.service.cli.remote import connection
 from sprag_study.service.languages import _
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from sprag_study.service.answers.workers import Dispatcher
 
 
-def workers(server: Server = DEFAULT_SERVER, token: Token = None, as_json: JsonFlag = False) -> None:
+def workers() -> None:
     """Show the workers of the service by host, and those that are refused, with the reason."""
-    with connection(server, token) as client:
+    with connection() as client:
         found = client.workers()
-    if as_json:
+    if wants_json():
         write_json(found)
         return
     headings = (_("workers"), _("usable"), _("busy"), _("idle threads"), _("refused"), _("cases/s"))

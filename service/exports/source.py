@@ -95,7 +95,7 @@ class StoredRows:
         if cases < least or (before.revision == after.revision and cases != least):
             raise MissingRowsError(
                 f"{least:,} cases of the study {self.study_id} have ended, and {cases:,} were read: ask again; if that "
-                "does not help, `sprag db check` looks for the cause"
+                "does not help, `sprag admin db check` looks for the cause"
             )
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from functools import cache
-from typing import TYPE_CHECKING, Any, Final, Literal, cast, get_args
+from typing import TYPE_CHECKING, Any, Final, cast
 
 from sprag_study.sentences import Sentence
+from sprag_study.service import formats
 from sprag_study.service.faults import refused
 from sprag_study.service.figures.curves import curves_figure
 from sprag_study.service.figures.read import read_figure
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
     from sprag_study.service.results.curves import Curves, Map
     from sprag_study.service.results.sensitivity import Sensitivity
 
-Picture = Literal["svg", "png", "pdf"]
-PICTURES: Final[tuple[Picture, ...]] = get_args(Picture)
+Picture = formats.Picture
+PICTURES: Final = formats.PICTURES
 MEDIA_TYPES: Final[dict[Picture, str]] = {"svg": "image/svg+xml", "png": "image/png", "pdf": "application/pdf"}
 
 #: Limits of one picture; more would be unreadable.

@@ -169,7 +169,8 @@ class Access:
         record = self._users.get(name)
         role = self._user_role if record is None else record.role
         if role is None or (record is not None and record.removed_at is not None):
-            raise ApiError("not-allowed", f"{shown(name)} is not a user of this service; `sprag user add` adds one.")
+            detail = f"{shown(name)} is not a user of this service; `sprag admin user add` adds one."
+            raise ApiError("not-allowed", detail)
         return Grant(f"user {name}", name, role, None, name, None if record is None else record.quota.checks)
 
     def actor(self, grant: Grant, scope: Scope) -> Actor:

@@ -101,7 +101,12 @@ PROBLEM_TYPES: dict[Kind, ProblemType] = _catalogue(
     _P("queue-full", 429, "Too many studies are waiting", "Wait until some have ended, or cancel some."),
     _P("quota-exceeded", 429, "Your quota is used up", "Wait until studies have ended, or delete some."),
     _P("internal", 500, "The service failed", "This is a bug in the program; the server's log has the details."),
-    _P("unavailable", 503, "The service cannot do this now", "Try again later; `sprag doctor` looks for the cause."),
+    _P(
+        "unavailable",
+        503,
+        "The service cannot do this now",
+        "Try again later; `sprag admin doctor` looks for the cause.",
+    ),
     _P("storage-full", 507, "There is no room for this", "Free space on the disk, or delete studies."),
     _P("timed-out", 504, "The computation took too long", "Request a shorter part of the run."),
 )

@@ -1,4 +1,4 @@
-"""The dispatcher of a database, run alone (`sprag worker`) or as a child process of the service (`sprag serve`)."""
+"""The dispatcher of a database, run alone (`sprag admin worker`) or as a child of the service (`sprag serve`)."""
 
 from __future__ import annotations
 
@@ -232,7 +232,7 @@ def _stand_by(
             reported = True
             say(
                 f"process {lock.holder()} has not responded for {silence:.0f} s; stop it, or continue without it: "
-                "`sprag worker --take-over`"
+                "`sprag admin worker --take-over`"
             )
         time.sleep(STANDBY_SECONDS)
     return True

@@ -258,6 +258,6 @@ def _why_held(record: StudyRecord, *, passing: bool) -> str:
     if passing:
         return f"{cause}; nothing of it is kept: free some space, or name another place with TMPDIR or --db"
     return (
-        f"{cause}; {record.done} of {record.cases} cases are kept as {record.id}, and `sprag worker` or `sprag serve` "
-        "with this database continues it when there is room"
+        f"{cause}; {record.done} of {record.cases} cases are kept as {record.id}, and `sprag admin worker` or `sprag "
+        "serve` with this database continues it when there is room"
     )

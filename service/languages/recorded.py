@@ -17,10 +17,10 @@ DISK: Final = N_("the disk that holds {path} has {free} MB left")
 LARGEST_FILE: Final = N_("files cannot grow beyond {size} MB here (ulimit -f)")
 #: Of a database that is not the deployment, and why nothing has run there.
 COPY: Final = N_(
-    "This database is a copy, or was moved: its schedules are off, and it sends no reports, until `sprag db adopt` "
-    "confirms that it takes the place of the original."
+    "This database is a copy, or was moved: its schedules are off, and it sends no reports, until `sprag admin db "
+    "adopt` confirms that it takes the place of the original."
 )
-OFF: Final = N_("this database is a copy, whose schedules are off until `sprag db adopt`")
+OFF: Final = N_("this database is a copy, whose schedules are off until `sprag admin db adopt`")
 #: Of an alarm of the watchdog, and why.
 NOTHING_RAN: Final = N_("It was due at {due}, and nothing has run: {why}.")
 NOT_TAKEN: Final = N_("the worker has not taken it up")
@@ -55,6 +55,6 @@ LATE: Final = N_("its deadline passed at {time}: {done} of {cases} cases are don
 ROUNDS_DONE: Final = N_("round {round} of at most {most} is done")
 NO_ROUND: Final = N_("no round is done")
 #: Why a token lets nobody in.
-TOKEN_EXPIRED: Final = N_("The token {token} expired at {time}; `sprag token create` creates another.")
+TOKEN_EXPIRED: Final = N_("The token {token} expired at {time}; `sprag admin token create` creates another.")
 TOKEN_REVOKED: Final = N_("The token {token} was revoked.")
 TOKEN_OF_REMOVED_USER: Final = N_("The token {token} belongs to the user {user}, who was removed.")

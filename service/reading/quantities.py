@@ -195,6 +195,12 @@ def units_for(study: Study, spec: Mapping[str, Any], text: str) -> Units:
     return Units({si: unit for si, unit in {**others, **chosen}.items() if unit != si})
 
 
+def preferred(choice: str, model: str) -> dict[str, str]:
+    """The unit in which plain numbers of each kind are shown, by SI unit; raises SelectionError as `read_units`."""
+    rest, chosen = read_units(choice)
+    return ({} if rest == SI else workshop_units(model)) | chosen
+
+
 def workshop_units(model: str) -> dict[str, str]:
     """The units of a workshop for machines of a model, by SI unit."""
     units = models.model_of(model).presentation.workshop

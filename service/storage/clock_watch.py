@@ -24,7 +24,7 @@ FOLLOWED_AFTER: Final = timedelta(hours=1)
 NOTE_AFTER: Final = timedelta(minutes=10)
 MESSAGE: Final = (
     "The clock jumped ahead, from {} to {}: nothing is deleted by age until it is corrected, or until "
-    "`sprag db clock` says that it is right"
+    "`sprag admin db clock` says that it is right"
 )
 
 
@@ -49,7 +49,7 @@ class ClockWatch:
                 self._dispatchers.clock.monotonic(),
                 self._dispatchers.believed_clock(),
             )
-            if self._believed is None or noted is None or noted != self._noted:  # the start, or `sprag db clock`
+            if self._believed is None or noted is None or noted != self._noted:  # the start, or `sprag admin db clock`
                 expected, allowed = noted or now, LONGEST_PAUSE
             else:
                 expected, allowed = self._believed[0] + timedelta(seconds=elapsed - self._believed[1]), JUMP

@@ -1,7 +1,7 @@
 """Which database is the deployment: a copy is recognised by its place, and fires neither schedules nor reports.
 
 A database keeps where it was when it became the deployment: its file, or its number on its server. A copy has what the
-original kept and lies elsewhere, so it is off until somebody adopts it (`sprag db adopt`).
+original kept and lies elsewhere, so it is off until somebody adopts it (`sprag admin db adopt`).
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ __all__ = [
 ]
 
 #: What makes a database, at the end of a sentence.
-CREATED_BY = "`sprag serve`, `sprag run --db` and `sprag db upgrade` create one"
+CREATED_BY = "`sprag serve`, `sprag run --db` and `sprag admin db upgrade` create one"
 
 
 class DatabaseError(StoreError):

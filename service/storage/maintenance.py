@@ -73,12 +73,14 @@ def other_revision(session: Session, found: str | None) -> SchemaError:
     if found is None:
         return SchemaError(f"{where} is empty, and not a database of Sprag yet: {CREATED_BY}")
     if found.startswith(MOVING):
-        return SchemaError(f"{where} is the target of a move that is not complete: run the same `sprag db move` again")
+        unfinished = f"{where} is the target of a move that is not complete"
+        return SchemaError(f"{unfinished}: run the same `sprag admin db move` again")
     if found in REVISIONS:
-        return SchemaError(f"{where} has revision {found}, this program needs {HEAD_REVISION}: run `sprag db upgrade`")
+        needed = f"{where} has revision {found}, this program needs {HEAD_REVISION}"
+        return SchemaError(f"{needed}: run `sprag admin db upgrade`")
     return SchemaError(
         f"{where} has revision {found}, which is newer than this program's ({HEAD_REVISION}): install the newer Sprag "
-        "and run its `sprag db upgrade`"
+        "and run its `sprag admin db upgrade`"
     )
 
 
@@ -135,7 +137,7 @@ def check(session: Session) -> CheckReport:
     try:
         found = revision(session)
         if found is None:
-            problems.append("the database is empty: run `sprag db upgrade`")
+            problems.append("the database is empty: run `sprag admin db upgrade`")
         elif found != HEAD_REVISION:
             problems.append(str(other_revision(session, found)))
         if not session.on_server:

@@ -90,7 +90,7 @@ class Readiness:
                 yield (
                     f"The worker {record.owner} has not responded since "
                     f"{record.heartbeat_at.isoformat(timespec='seconds')}: its {record.studies} studies are not run "
-                    "(`sprag worker --take-over` ends it)."
+                    "(`sprag admin worker --take-over` ends it)."
                 )
             elif shortage:
                 yield f"The worker {record.owner}: {shortage}"
@@ -107,7 +107,7 @@ class Readiness:
             if not self._store.session.can_write(self._locked_seconds):
                 return [
                     f"The write lock of the database was not free for {self._locked_seconds:g} s: a process that holds "
-                    "it hangs or was stopped (`sprag worker --take-over` ends a hung worker).",
+                    "it hangs or was stopped (`sprag admin worker --take-over` ends a hung worker).",
                     *self._worker(),
                 ]
             if held := self._store.room.full():

@@ -28,7 +28,7 @@ def test_a_study_from_submission_to_picture(running: Service, tmp_path: Path, sp
     submitted = sprag("submit", SMALL, *at)
     assert submitted.code == 0
     study = submitted.out.strip()
-    watched = sprag("watch", study, *at)
+    watched = sprag("study", "watch", study, *at)
     assert watched.code == 0
     assert "17 of 17 cases done, 17 ok" in watched.err
     assert watched.out.strip() == study
@@ -85,11 +85,11 @@ def test_a_study_is_held_and_cancelled(running: Service, tmp_path: Path, sprag: 
     long = tmp_path / "long.json"
     long.write_text(json.dumps(spec))
     study = sprag("submit", long, *at).data["id"]
-    assert sprag("pause", study, *at).data["state"] == "paused"
-    assert sprag("resume", study, *at).data["state"] in ("queued", "running")
-    assert sprag("cancel", study, *at).data["state"] in ("cancelling", "cancelled")
-    watched = sprag("watch", study, *at)
-    assert watched.code == 1
+    assert sprag("study", "pause", study, *at).data["state"] == "paused"
+    assert sprag("study", "resume", study, *at).data["state"] in ("queued", "running")
+    assert sprag("study", "cancel", study, *at).data["state"] in ("cancelling", "cancelled")
+    watched = sprag("study", "watch", study, *at)
+    assert watched.code == 4
     assert watched.data["state"] == "cancelled"
 
 
@@ -148,14 +148,14 @@ def test_a_run_kept_in_a_database_is_found_there_by_whoever_has_the_token(
     database = tmp_path / "study.sqlite3"
     done = sprag("run", SMALL, "--db", database, "--json")
     assert done.code == 0
-    assert sprag("db", "check", "--db", database).code == 0
+    assert sprag("admin", "db", "check", "--db", database).code == 0
     copy = tmp_path / "copy.sqlite3"
-    assert sprag("db", "backup", copy, "--db", database).code == 0
-    assert sprag("db", "backup", copy, "--db", database).code == 2
-    assert sprag("db", "upgrade", "--db", copy, "--json").data["before"] is not None
+    assert sprag("admin", "db", "backup", copy, "--db", database).code == 0
+    assert sprag("admin", "db", "backup", copy, "--db", database).code == 2
+    assert sprag("admin", "db", "upgrade", "--db", copy, "--json").data["before"] is not None
     (folder := tmp_path / "served").mkdir()
     copy.rename(folder / "sprag.sqlite3")
-    token = sprag("token").out.strip()
+    token = sprag("admin", "token").out.strip()
     with service(folder, "--processes", 1, SPRAG_TOKEN=token) as running:
         refused = sprag("list", "--server", running.address)
         assert refused.code == 3
@@ -167,7 +167,7 @@ def test_a_run_kept_in_a_database_is_found_there_by_whoever_has_the_token(
 
 def test_a_worker_alone_runs_what_a_service_was_given(tmp_path: Path, sprag: Sprag) -> None:
     database = tmp_path / "study.sqlite3"
-    assert sprag("db", "upgrade", "--db", database).code == 0
+    assert sprag("admin", "db", "upgrade", "--db", database).code == 0
     worker = subprocess.Popen(
         [*COMMAND, "worker", "--db", str(database), "--processes", "1"], stderr=subprocess.PIPE, env=environment()
     )
@@ -275,19 +275,19 @@ def test_an_interrupt_of_a_command_that_follows_names_the_study_that_goes_on(
         assert process.stderr is not None
         study = study or sprag("submit", long, "--key", str(tmp_path), *at).out.strip()
         # A pause shows that the command follows the study.
-        assert sprag("pause", study, *at).code == 0
+        assert sprag("study", "pause", study, *at).code == 0
         lines = iter(process.stderr.readline, b"")
         assert any(b"is paused" in line for line in lines)
-        assert sprag("resume", study, *at).code == 0
+        assert sprag("study", "resume", study, *at).code == 0
         process.send_signal(signal.SIGINT)
         said = process.stderr.read().decode()
         assert process.wait(SECONDS) == 130
     assert "interrupted" in said.splitlines()
     assert f"{study} continues" in said
-    assert f"sprag cancel {study}" in said
+    assert f"sprag study cancel {study}" in said
     state = json.loads(sprag("list", "--json", *at).out)
     assert {item["id"]: item["state"] for item in state["studies"]}[study] in ("queued", "running")
-    assert sprag("cancel", study, *at).code == 0
+    assert sprag("study", "cancel", study, *at).code == 0
 
 
 def test_a_full_disk_is_storage_trouble(sprag: Sprag) -> None:
@@ -303,19 +303,19 @@ def test_a_full_disk_is_storage_trouble(sprag: Sprag) -> None:
 
 
 def test_specs_and_data_come_through_standard_input() -> None:
-    assert processes.sprag("validate", "-", stdin=(EXAMPLES / "two_pendulums.toml").read_bytes()).code == 0
+    assert processes.sprag("check", "-", stdin=(EXAMPLES / "two_pendulums.toml").read_bytes()).code == 0
     measured = (EXAMPLES / "clutch_measured.csv").read_bytes()
     fitted = processes.sprag("fit", "-", "--accuracy", "0.05", "--json", stdin=measured)
     assert fitted.data["degree"] == 3
 
 
 def test_output_for_a_terminal_of_another_character_set() -> None:
-    assert processes.sprag("validate", SPEC, PYTHONIOENCODING="ascii").code == 0
+    assert processes.sprag("check", SPEC, PYTHONIOENCODING="ascii").code == 0
     assert processes.sprag("--help", PYTHONIOENCODING="ascii").code == 0
 
 
 def test_doctor_finds_the_installation_sound(tmp_path: Path, sprag: Sprag) -> None:
-    done = sprag("doctor", "--json", "--db", tmp_path / "x.sqlite3")
+    done = sprag("admin", "doctor", "--json", "--db", tmp_path / "x.sqlite3")
     assert done.code == 0, done.data
     assert done.data["sound"] is True
     assert {
@@ -335,9 +335,9 @@ def test_doctor_finds_the_installation_sound(tmp_path: Path, sprag: Sprag) -> No
 
 def test_doctor_names_files_that_others_may_read(tmp_path: Path, sprag: Sprag) -> None:
     file = tmp_path / "x.sqlite3"
-    assert sprag("db", "upgrade", "--db", file).code == 0
+    assert sprag("admin", "db", "upgrade", "--db", file).code == 0
     file.chmod(0o640)
-    done = sprag("doctor", "--db", file)
+    done = sprag("admin", "doctor", "--db", file)
     assert done.code == 3
     assert f"others can read {file}: `chmod 600`" in done.out
 
@@ -345,6 +345,6 @@ def test_doctor_names_files_that_others_may_read(tmp_path: Path, sprag: Sprag) -
 def test_doctor_finds_a_database_of_another_program(tmp_path: Path, sprag: Sprag) -> None:
     file = tmp_path / "x.sqlite3"
     file.write_text("no database at all" * 1000)
-    done = sprag("doctor", "--db", file)
+    done = sprag("admin", "doctor", "--db", file)
     assert done.code == 3
     assert "WRONG" in done.out

@@ -75,9 +75,9 @@ def signals() -> Iterator[None]:
     ("spoil", "message", "remedy"),
     [
         (overwritten, "is not a Sprag database", "name another file with --db"),
-        (damaged_within, "is damaged", "`sprag db check`"),
-        (cut_short, "is damaged", "`sprag db backup`"),
-        (of_a_newer_version, "newer than this program", "run its `sprag db upgrade`"),
+        (damaged_within, "is damaged", "`sprag admin db check`"),
+        (cut_short, "is damaged", "`sprag admin db backup`"),
+        (of_a_newer_version, "newer than this program", "run its `sprag admin db upgrade`"),
     ],
 )
 def test_a_database_that_cannot_be_trusted_is_refused_at_the_start(
@@ -85,7 +85,7 @@ def test_a_database_that_cannot_be_trusted_is_refused_at_the_start(
     sprag: Callable[..., Finished], signals: None,
 ) -> None:  # fmt: skip
     database = tmp_path / "sprag.sqlite3"
-    assert sprag("db", "upgrade", "--db", database).code == 0
+    assert sprag("admin", "db", "upgrade", "--db", database).code == 0
     spoil(database)  # type: ignore[operator]
     before = database.read_bytes()
     refused = sprag(command, "--db", database, *(["--port", "0"] if command == "serve" else []))

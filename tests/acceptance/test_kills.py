@@ -60,13 +60,13 @@ def test_a_copy_made_during_a_run_goes_on_where_it_was_made(tmp_path: Path, spra
         harness.until(lambda: harness.done(service.database, study) > 20, "the study goes on")
         (tmp_path / "restored").mkdir()
         copy = tmp_path / "restored" / "sprag.sqlite3"
-        saved = sprag("db", "backup", copy, "--db", service.database)
+        saved = sprag("admin", "db", "backup", copy, "--db", service.database)
         assert saved.code == 0, saved.err
         assert service.look(study)["state"] == "running"
         service.http.post(f"/studies/{study}:cancel")
     done = harness.done(copy, study)
     assert 20 < done < 120
-    assert sprag("db", "check", "--db", copy).code == 0
+    assert sprag("admin", "db", "check", "--db", copy).code == 0
     with harness.running(copy.parent, "--processes", 1) as service:
         assert service.look(study)["progress"]["done"] >= done
         service.finish(study)

@@ -31,7 +31,7 @@ def change(store: Store, case: int, **values: object) -> None:
 
 
 def damaged(store: Store) -> list[str]:
-    """What `sprag db check` says of rows."""
+    """What `sprag admin db check` says of rows."""
     found = [str(item) for item in store.digests.all_damaged_rows()]
     assert [problem for problem in store.check().problems if "rows of the study" in problem] == found
     return found

@@ -118,7 +118,7 @@ def test_the_command_lists_and_writes_them(
     connected(study_views)
     service, study_id = filled
     options = ("--where", "shaft.load <= 0.3", "--sort=-efficiency", "--limit", 3)
-    shown = sprag("explore", study_id, *options, "-o", tmp_path / "best.csv")
+    shown = sprag("show", study_id, "explore", *options, "-o", tmp_path / "best.csv")
     assert shown.out.splitlines()[0].strip() == "18 of 30 cases"
     cases = [
         int(line.split()[0]) for line in shown.out.splitlines() if line.split()[:1] and line.split()[0].isdecimal()
@@ -127,7 +127,7 @@ def test_the_command_lists_and_writes_them(
     assert cases[-3:] == expected[:3]
     with (tmp_path / "best.csv").open(newline="") as file:
         assert [int(row["case"]) for row in csv.DictReader(file)] == expected
-    told = json.loads(sprag("explore", study_id, *options, "--json").out)
+    told = json.loads(sprag("show", study_id, "explore", *options, "--json").out)
     assert [row["case"] for row in told["cases"]] == expected[:3]
 
 

@@ -102,19 +102,19 @@ def test_the_command_shows_them_and_writes_them(
 ) -> None:
     connected(study_views)
     service, study_id = filled
-    shown = sprag("answers", study_id, "--point", "0.2 N*m", "-o", tmp_path / "answers.svg")
+    shown = sprag("show", study_id, "answers", "--point", "0.2 N*m", "-o", tmp_path / "answers.svg")
     assert shown.code == 0
     assert shown.out.count("Largest useful power") == 6 + 1
     assert "among all cases" in shown.out
     assert "working point" not in shown.err
     assert (tmp_path / "answers.svg").read_text().startswith("<?xml")
-    told = json.loads(sprag("answers", study_id, "--point", "0.2 N*m", "--json").out)
+    told = json.loads(sprag("show", study_id, "answers", "--point", "0.2 N*m", "--json").out)
     assert told == service.get(f"/studies/{study_id}/answers", point="0.2 N*m")
     # What is beyond the cases that were run is no number.
     beyond = [item["value"] for curve in told["curves"] for item in curve["answers"] if item["above"]]
     assert beyond
     assert shown.out.count("> ") == len(beyond)
-    assert all(f"> {cell_text(value)} " in shown.out for value in beyond)
+    assert all(f"> {cell_text(value)}\t" in shown.out for value in beyond)
 
 
 def test_the_page_says_the_answers_first(filled: tuple[Service, str]) -> None:

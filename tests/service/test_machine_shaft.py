@@ -161,8 +161,8 @@ def test_faults_by_http_and_by_command(
         assert (error["pointer"], error["code"]) == (pointer, code)
     path = tmp_path / "press.json"
     path.write_text(json.dumps(changed(changes)))
-    assert f"  {pointer}: {error['message']}" in sprag("validate", path).err
-    done = sprag("validate", path, "--json")
+    assert f"  {pointer}: {error['message']}" in sprag("check", path).err
+    done = sprag("check", path, "--json")
     assert (done.code, [(item["pointer"], item["code"]) for item in done.data["problems"]]) == (2, [(pointer, code)])
 
 

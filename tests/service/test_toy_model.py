@@ -321,14 +321,14 @@ def test_commands_and_the_client_know_it(
     service, study_id = finished
     spec = tmp_path / "toy.json"
     spec.write_text(json.dumps(SPEC))
-    assert sprag("validate", spec).code == 0
-    assert sprag("preview", spec, "--json").data["cases"] == 12
-    motion = sprag("trajectory", spec, "--case", 7, "--points", 5)
+    assert sprag("check", spec).code == 0
+    assert sprag("check", spec, "--json").data["cases"] == 12
+    motion = sprag("show", spec, "trajectory", "--case", 7, "--points", 5)
     assert motion.code == 0
     assert motion.out.splitlines()[0].split(",")[1] == "displacement"
     wrong = tmp_path / "wrong.json"
     wrong.write_text(json.dumps(SPEC | {"base": {"body": {"mass": 1, "spring_rate": -2}}}))
-    assert "/base/body/spring_rate" in sprag("validate", wrong, "--json").out
+    assert "/base/body/spring_rate" in sprag("check", wrong, "--json").out
     values = expected(service.store.studies.study(study_id))
     with Client("http://localhost", transport=PortalTransport(service.app, portal)) as client:
         study = client.study(study_id)

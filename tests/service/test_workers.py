@@ -75,9 +75,9 @@ def test_the_workers_are_shown_by_host_with_refusals(
     assert '<td class="name">a</td><td>znver5</td>' in page
     assert "<code>tls://b:1</code>: numpy: 1.0 instead of 2.0" in page
     assert 'href="http://head:8787/status"' in page
-    assert execute(["workers", "--json"]) == 0
+    assert execute(["admin", "workers", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == found
-    assert execute(["workers"]) == 0
+    assert execute(["admin", "workers"]) == 0
     shown = capsys.readouterr()
     assert "idle threads" in shown.out
     rows = [line for line in shown.out.splitlines() if line.split()[:1] in (["a"], ["b"])]
@@ -99,7 +99,7 @@ def test_the_workers_are_shown_by_host_with_refusals(
     assert samples["sprag_host_cases_per_second", *dask, ("host", "a")] == 0.0
     with service.store.session.write() as connection:
         connection.execute(sa.update(DISPATCHERS).values(heartbeat_at=DISPATCHERS.c.heartbeat_at - 120_000_000))
-    assert execute(["workers"]) == 0
+    assert execute(["admin", "workers"]) == 0
     shown = capsys.readouterr()
     assert "idle threads" not in shown.out, "the workers of a silent dispatcher are not known"
     assert "has not responded since" in shown.err
@@ -132,7 +132,7 @@ def test_a_difference_says_from_which_dispatcher(
     service.store.work.take_over("other:8")
     difference = f"Python: 2.7 instead of {platform.python_version()}"
     assert f"<code>another</code> (differs from that of head:7: {difference})" in service.http.get("/me/workers").text
-    assert execute(["workers"]) == 0
+    assert execute(["admin", "workers"]) == 0
     said = capsys.readouterr().err
     assert said.count("Its fingerprint differs from that of ") == 1
     assert f"Its fingerprint differs from that of head:7: {difference}." in said

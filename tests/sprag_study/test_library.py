@@ -204,9 +204,9 @@ for name in ("numpy", "pandas", "xarray", "numba", "sqlalchemy", "fastapi", "pyd
 REMOTE = (
     "list",
     "submit examples/press.toml",
-    "watch st_1",
-    "cancel st_1",
-    "curve st_1 --x shaft.load --y efficiency",
+    "study watch st_1",
+    "study cancel st_1",
+    "show st_1 curves --x shaft.load --y efficiency",
     "export st_1 -o rows.xlsx",
     "export st_1 -o report.pdf",
     "schedule list",
@@ -235,7 +235,7 @@ from sprag_study.service.cli.shown import show_curves
 from sprag_study.service.cli.remote import show_study
 progress = {"done": 2, "total": 2, "ok": 1, "endings": {OK: 1, "chatter": 1}}
 about = {"id": "st_1", "name": "one", "model": "m", "state": "finished", "time_over": False}
-show_study({**about, "progress": progress}, False)
+show_study({**about, "progress": progress})
 curve = {"by": {}, "at": {}, "x": [1.0, 2.0], "y": {"efficiency": [0.5, None]}, "endings": [OK, "chatter"]}
 results = {"efficiency": {"unit": "1"}}
 show_curves({"x": {"path": "shaft.load", "unit": "N*m"}, "results": results, "units": {}, "curves": [curve]})

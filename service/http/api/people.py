@@ -41,7 +41,7 @@ def get_me(context: Ctx, request: Request) -> Response:
 
 @router.get("/users", response_model=m.UserList, responses=problems("invalid-parameter", "not-allowed"))
 def list_users(context: Ctx) -> Response:
-    """Every user with role and quotas, by name, for administrators. `sprag user` adds and changes them."""
+    """Every user with role and quotas, by name, for administrators. `sprag admin user` adds and changes them."""
     return json_response({"users": [user_json(context.store.people, user) for user in context.store.people.users()]})
 
 

@@ -17,7 +17,7 @@ from sprag_study.service.http.routers import page_router
 from sprag_study.service.http.threads import in_thread
 from sprag_study.service.http.web.form.entries import Faults, Values
 from sprag_study.service.http.web.form.sent import settle
-from sprag_study.service.http.web.form.sheet import Quantity, preferred, quantity_of
+from sprag_study.service.http.web.form.sheet import Quantity, quantity_of
 from sprag_study.service.http.web.form.values import Form
 from sprag_study.service.http.web.templates import page
 from sprag_study.service.http.work import Attended
@@ -25,18 +25,15 @@ from sprag_study.service.jobs import checks
 from sprag_study.service.json_text import to_bytes
 from sprag_study.service.languages import gettext
 from sprag_study.service.reading.faults import message
-from sprag_study.service.reading.numbers import parse_number
-from sprag_study.service.reading.quantities import TYPED, Units, offered, read_units
-from sprag_study.service.reading.reader import Reading
-from sprag_study.service.reading.units import QuantityError, examples, parse_quantity, split_quantity
-from sprag_study.service.reading.wording import typed_text, words
+from sprag_study.service.reading.quantities import preferred
+from sprag_study.service.reading.units import examples
+from sprag_study.service.reading.wording import words
 from sprag_study.service.spec.components import (
     COEFFICIENTS,
     KINDS,
     Component,
     fields_of,
     kind_of,
-    list_text,
     model_of_kind,
     needed,
     read_components,
@@ -44,13 +41,12 @@ from sprag_study.service.spec.components import (
 )
 from sprag_study.service.spec.text import Body
 from sprag_study.service.storage.errors import ComponentNotFoundError
+from sprag_study.service.views.components import shown_fields
 from sprag_study.worker.limits import MAX_COMPONENTS
 from sprag_study.worker.models.parameters import placed
 
 router = page_router()
 
-#: Digits of a number that somebody typed.
-_DIGITS = 8
 #: Faults whose allowed values are names of fields or choices.
 _NAMING = ("unknown-field", "invalid-choice")
 
@@ -81,38 +77,6 @@ def _columns(kind: str, values: Values) -> list[_Column]:
             shown = "" if parameter.unit == "1" else examples(parameter.unit)[0]
             found.append(_Column(name, words(name), quantity_of([text], parameter.unit, units), shown, {}, must))
     return found
-
-
-def _shown(component: Component) -> dict[str, str]:
-    """The fields of a component for the reader: quantities in units of the page, choices by what they are called."""
-    kind, shown = component.kind, dict[str, str]()
-    for name, text in component.fields.items():
-        parameter = fields_of(kind).get(name)
-        if parameter is None:
-            shown[name] = gettext(kind_of(kind).titles.get(text, text))
-        elif name == COEFFICIENTS:
-            each = enumerate(list_text(text))
-            shown[name] = "; ".join(
-                _printed(kind, item, placed(parameter, f"{COEFFICIENTS}.{index}").unit) for index, item in each
-            )
-        else:
-            shown[name] = _printed(kind, text, parameter.unit)
-    return shown
-
-
-def _printed(kind: str, text: str, si: str) -> str:
-    """A quantity in the unit of the page; "as typed" in the one that somebody wrote, if quantities are shown in it."""
-    choice, model, number = current().choice.units, model_of_kind(kind), parse_number(text)
-    try:
-        value = parse_quantity(text if number is None else number, si)
-        units = preferred(choice, model)
-        if read_units(choice)[0] == TYPED:
-            typed = f"1 {split_quantity(text)[1] or si}"
-            same = (unit for unit in offered(si) if parse_quantity(f"1 {unit}", si) == parse_quantity(typed, si))
-            units = {si: next(same, si)}
-        return Reading(model, Units(units)).quantity(value, si, _DIGITS)
-    except QuantityError:  # kept by an earlier release
-        return typed_text(text)
 
 
 @router.get("/parts")
@@ -194,7 +158,11 @@ def _page(context: Context, values: Values, faults: Faults, status: int, read: i
             (
                 kind_of(kind),
                 _columns(kind, values if values.get("kind") == kind else {}),
-                [(record, _shown(record.component)) for record in records if record.component.kind == kind],
+                [
+                    (record, shown_fields(record.component, current().choice.units))
+                    for record in records
+                    if record.component.kind == kind
+                ],
             )
             for kind in KINDS
         ],

@@ -100,7 +100,7 @@ def linked(path: Path, names: int) -> DatabaseError:
     """The error of a file that has several names."""
     return DatabaseError(
         f"the database file {path} has {names} names (hard links), and used under two it is destroyed: keep one "
-        f"of them (`find DIRECTORY -samefile {path}` lists them); a copy is made by `sprag db backup`",
+        f"of them (`find DIRECTORY -samefile {path}` lists them); a copy is made by `sprag admin db backup`",
         "unsupported-database",
     )
 

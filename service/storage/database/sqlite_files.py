@@ -278,7 +278,7 @@ class DatabaseFile:
                 f"the database {self.path} cannot be opened; check the folder's rights", "database-unreachable"
             ),
             "Could not decode": DatabaseError(
-                f"a text in the database {self.path} changed on the disk; `sprag db check` tells where",
+                f"a text in the database {self.path} changed on the disk; `sprag admin db check` tells where",
                 "database-damaged",
             ),
             "file is not a database": DatabaseError(
@@ -292,8 +292,8 @@ class DatabaseFile:
     def damaged(self) -> DatabaseError:
         """The error of a database that is damaged, which is not trusted any more from now on."""
         self.damage = (
-            f"the database {self.path} is damaged; `sprag db check` tells where: put the latest copy that "
-            "`sprag db backup` wrote in its place"
+            f"the database {self.path} is damaged; `sprag admin db check` tells where: put the latest copy that "
+            "`sprag admin db backup` wrote in its place"
         )
         return DatabaseError(self.damage, "database-damaged")
 

@@ -1,4 +1,4 @@
-"""The command `sprag branch`."""
+"""The command `sprag show ID branch`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Sprag = Callable[..., Finished]
 
 def test_the_example_of_the_guide(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
     guide = (examples.parent / "docs" / "branches.md").read_text(encoding="utf-8")
-    command = next(line for line in guide.splitlines() if line.startswith("    sprag branch "))
+    command = next(line for line in guide.splitlines() if line.startswith("    sprag show "))
     words = shlex.split(command)[1:]
     words[1], words[-1] = str(examples / Path(words[1]).name), str(tmp_path / words[-1])
     done = sprag(*words)
@@ -34,7 +34,7 @@ def test_the_example_of_the_guide(sprag: Sprag, examples: Path, tmp_path: Path) 
 
 def test_json(sprag: Sprag, examples: Path) -> None:
     words = ("--case", 178, "--along", "shaft.load", "--from", "0.19 N*m", "--to", 0.23, "--format", "json")
-    made = json.loads(sprag("branch", examples / "one_pendulum.json", *words).out)
+    made = json.loads(sprag("show", examples / "one_pendulum.json", "branch", *words).out)
     assert (made["order"], made["value"], made["low"]) == (2, 0.2, 0.19)
     assert [special["kind"] for special in made["specials"]] == ["grazing", "doubling"]
     assert made["ends"][1] == "the orbit has half the order there, where its period doubles"
@@ -51,6 +51,6 @@ def test_json(sprag: Sprag, examples: Path) -> None:
 def test_what_cannot_be_followed_is_refused(
     sprag: Sprag, examples: Path, spec: str, words: tuple[object, ...], told: str
 ) -> None:
-    done = sprag("branch", examples / spec, "--along", "shaft.load", *words)
+    done = sprag("show", "branch", examples / spec, "--along", "shaft.load", *words)
     assert done.code == 2
     assert told in done.err

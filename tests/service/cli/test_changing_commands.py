@@ -1,4 +1,4 @@
-"""Every command that changes a database is in its audit log, with the user of the machine; `sprag user`."""
+"""Every command that changes a database is in its audit log, with the user of the machine; `sprag admin user`."""
 
 from __future__ import annotations
 
@@ -26,31 +26,33 @@ Run = Callable[..., int]
 #: By command: what it writes into the log, and its arguments; words in capitals are the ids and files of `known`.
 CHANGING = {
     "run": (["study.create", "study.cancel"], "SPEC"),
-    "calibrate": (["study.create", "study.cancel"], "BENCH"),
-    "token create": (["token.create"], "--name laptop --user dora --expires 30"),
-    "token revoke": (["token.revoke"], "TOKEN"),
-    "user add": (["user.add"], "emil --role viewer --cases 100 --storage 10 --checks 1"),
-    "user change": (["user.change"], "dora --role administrator"),
-    "user remove": (["user.remove"], "dora"),
-    "user restore": (["user.restore"], "dora"),
-    "user hand-over": (["user.hand-over"], "dora --to ada"),
-    "db prune": (["study.delete"], "--older-than 1"),
-    "db clock": (["database.clock"], ""),
+    "show calibration": (["study.create", "study.cancel"], "BENCH"),
+    **{f"show {name}": (["study.create", "study.cancel"], "SPEC") for name in ("answers", "curves", "explore")},
+    "admin token create": (["token.create"], "--name laptop --user dora --expires 30"),
+    "admin token revoke": (["token.revoke"], "TOKEN"),
+    "admin user add": (["user.add"], "emil --role viewer --cases 100 --storage 10 --checks 1"),
+    "admin user change": (["user.change"], "dora --role administrator"),
+    "admin user remove": (["user.remove"], "dora"),
+    "admin user restore": (["user.restore"], "dora"),
+    "admin user hand-over": (["user.hand-over"], "dora --to ada"),
+    "admin db prune": (["study.delete"], "--older-than 1"),
+    "admin db clock": (["database.clock"], ""),
 }
 #: Commands that read, and those that name their actors themselves.
 OTHERS = {
-    "preview": "reads which rows can be reused",
+    **{f"show {name}": "as `show curves`" for name in ("front", "map", "ribbon", "sensitivity", "yield")},
+    "check": "reads which rows can be reused",
     "serve": "its requests, schedules and nightly work act by themselves",
-    "worker": "the same without requests; cases are no changes of a person",
-    "doctor": "reads",
-    "token list": "reads",
-    "user list": "reads",
-    "db check": "reads",
-    "db backup": "writes another file",
-    "db audit": "reads",
-    "db move": "writes another database, which has the log of this one",
-    "db adopt": "changes a copy only; tests/service/schedules/test_copies.py",
-    "db upgrade": "test_an_upgrade_is_in_the_log_of_the_new_revision",
+    "admin worker": "the same without requests; cases are no changes of a person",
+    "admin doctor": "reads",
+    "admin token list": "reads",
+    "admin user list": "reads",
+    "admin db check": "reads",
+    "admin db backup": "writes another file",
+    "admin db audit": "reads",
+    "admin db move": "writes another database, which has the log of this one",
+    "admin db adopt": "changes a copy only; tests/service/schedules/test_copies.py",
+    "admin db upgrade": "test_an_upgrade_is_in_the_log_of_the_new_revision",
 }
 
 
@@ -118,12 +120,12 @@ def test_commands_that_read_leave_no_row(known: tuple[Store, dict[str, str]], tm
     before = list(store.audit.rows(AuditFilter()))
     backup = str(tmp_path / "copy.sqlite3")
     for command in (
-        "token list",
-        "user list",
-        "db check",
-        "db audit",
-        f"db backup {backup}",
-        "db prune --older-than 9",
+        "admin token list",
+        "admin user list",
+        "admin db check",
+        "admin db audit",
+        f"admin db backup {backup}",
+        "admin db prune --older-than 9",
     ):
         assert execute([*command.split(), "--db", words["DB"]]) == 0, command
     assert list(store.audit.rows(AuditFilter())) == before
@@ -132,12 +134,12 @@ def test_commands_that_read_leave_no_row(known: tuple[Store, dict[str, str]], tm
 def test_an_upgrade_is_in_the_log_of_the_new_revision(tmp_path: Path) -> None:
     database = tmp_path / "old.sqlite3"
     thaw("0020", database)
-    assert execute(["db", "upgrade", "--db", str(database)]) == 0
+    assert execute(["admin", "db", "upgrade", "--db", str(database)]) == 0
     with Store.open(f"sqlite:///{database}") as store:
         (row,) = store.audit.rows(AuditFilter())
         assert (row.action, row.door, row.detail["before"]) == ("database.upgrade", "command", "0020")
         assert {study.owner for study in store.studies.page().studies} == {None}
-    assert execute(["db", "upgrade", "--db", str(database)]) == 0
+    assert execute(["admin", "db", "upgrade", "--db", str(database)]) == 0
     with Store.open(f"sqlite:///{database}") as store:
         assert len(list(store.audit.rows(AuditFilter()))) == 1
 
@@ -152,25 +154,25 @@ def test_users_are_listed_and_wrong_ones_refused(
         captured = capsys.readouterr()
         return code, captured.out, captured.err
 
-    assert "dora" in run("user", "list")[1]
-    listed = json.loads(run("user", "list", "--json")[1])["users"]
+    assert "dora" in run("admin", "user", "list")[1]
+    listed = json.loads(run("admin", "user", "list", "--json")[1])["users"]
     assert [(user["name"], user["role"], user["most_cases"]) for user in listed] == [
         ("ada", "designer", None),
         ("dora", "designer", None),
     ]
     for arguments, code in (
-        (("user", "add", "dora"), "user-exists"),
-        (("user", "add", " x"), "invalid-parameter"),
-        (("user", "change", "x", "--role", "viewer"), "user-not-found"),
-        (("user", "change", "dora"), "invalid-parameter"),
-        (("token", "create", "--name", "x", "--user", "x"), "user-not-found"),
+        (("admin", "user", "add", "dora"), "user-exists"),
+        (("admin", "user", "add", " x"), "invalid-parameter"),
+        (("admin", "user", "change", "x", "--role", "viewer"), "user-not-found"),
+        (("admin", "user", "change", "dora"), "invalid-parameter"),
+        (("admin", "token", "create", "--name", "x", "--user", "x"), "user-not-found"),
     ):
         failed = run(*arguments, "--json")
         assert (failed[0], json.loads(failed[2])["code"]) == (2, code), arguments
-    assert run("db", "audit", "--since", "yesterday")[0] == 2
-    made = json.loads(run("token", "create", "--name", "x", "--user", "dora", "--expires", "1", "--json")[1])
+    assert run("admin", "db", "audit", "--since", "yesterday")[0] == 2
+    made = json.loads(run("admin", "token", "create", "--name", "x", "--user", "dora", "--expires", "1", "--json")[1])
     assert (made["user"], made["used_at"]) == ("dora", None)
     assert made["expires_at"] > made["created_at"]
-    lines = run("db", "audit", "--action", "user.add", "--format", "jsonl")[1].splitlines()
+    lines = run("admin", "db", "audit", "--action", "user.add", "--format", "jsonl")[1].splitlines()
     assert [json.loads(line)["target"] for line in lines] == ["dora", "ada"]
-    assert run("db", "audit")[1].startswith("number,at,door,actor,")
+    assert run("admin", "db", "audit")[1].startswith("number,at,door,actor,")

@@ -15,7 +15,7 @@ import typer
 
 from sprag_study.service.actor import Role
 from sprag_study.service.cli import completion
-from sprag_study.service.cli.app import app
+from sprag_study.service.cli.app import command_line
 from sprag_study.service.settings import Settings
 from sprag_study.service.storage.people.scopes import TokenScope
 from sprag_study.worker.models import ENDING_SENTENCES, REGIME_SENTENCES, flags_of, model_names
@@ -65,8 +65,10 @@ def offered(program: dict[str, str], *words: str) -> list[str]:
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
 def test_bash_completes_commands_options_and_choices(program: dict[str, str]) -> None:
-    assert offered(program, "ex") == ["extend", "export", "explore"]
-    assert offered(program, "db", "up") == ["upgrade"]
+    assert offered(program, "s") == ["submit", "show", "study", "schedule", "serve", "settings"]
+    assert offered(program, "study", "ex") == ["extend"]
+    assert offered(program, "show", "latest", "e") == ["explore", "engagements"]
+    assert offered(program, "admin", "db", "up") == ["upgrade"]
     assert offered(program, "export", "--pro") == ["--project"]
     assert offered(program, "export", "--format", "p") == ["parquet", "pdf"]
 
@@ -77,17 +79,17 @@ def test_bash_completes_studies_of_the_service(program: dict[str, str], service:
     second = service.submit({**spec, "name": "two words"})
     with served(service.app) as address:
         program["SPRAG_SERVER"] = address
-        assert offered(program, "watch", "") == ["latest", second, first]
+        assert offered(program, "study", "watch", "") == ["latest", second, first]
         assert offered(program, "compare", "latest", "fe") == ["feeder"]
-        assert offered(program, "watch", "two") == [], "a name that needs quotes"
-    assert offered(program, "watch", "") == [], "no service answers"
+        assert offered(program, "study", "watch", "two") == [], "a name that needs quotes"
+    assert offered(program, "study", "watch", "") == [], "no service answers"
 
 
 def test_schedules_tokens_and_users_are_completed(
     service: Service, spec: dict[str, Any], settings: Settings, tmp_path: Path
 ) -> None:
     def given(**params: object) -> typer.Context:
-        context = typer.Context(typer.main.get_command(app))
+        context = typer.Context(command_line("en"))
         context.params = params
         return context
 
@@ -125,19 +127,24 @@ def test_options_are_completed(
     with served(service.app) as address:
         monkeypatch.setenv("SPRAG_SERVER", address)
         quantities = [*case["parameters"], *case["results"]]
-        assert offers("cases", study, "--sort", "") == ["case", "ending", "flags", *quantities]
-        assert offers("cases", "fee", "--sort", "shaft.l") == ["shaft.load"]
-        assert offers("explore", "latest", "--limit", "3", "--show", "") == quantities
-        assert offers("curve", study, "--x", "") == [*case["parameters"]]
+        assert offers("show", study, "cases", "--sort", "") == ["case", "ending", "flags", *quantities]
+        assert offers("show", "fee", "cases", "--sort", "shaft.l") == ["shaft.load"]
+        assert offers("show", "latest", "explore", "--limit", "3", "--show", "") == quantities
+        assert offers("show", study, "curves", "--x", "") == [*case["parameters"]]
         assert offers("compare", study, "latest", "--y", "eff") == ["efficiency"]
-        assert offers("cases", "--sort", "") == ["case", "ending", "flags"], "no study is named yet"
+        assert offers("show", "cases", "--sort", "") == ["case", "ending", "flags"], "no study is named yet"
         assert offers("models", "") == [m["name"] for m in service.get("/models")["models"]]
         assert offers("list", "--model", "m") == ["machine-shaft"]
-    assert offers("cases", study, "--sort", "shaft") == [], "no service answers"
-    assert offers("cases", study, "--ending", "c") == ["chatter", "cannot_assemble", "crashed", "cancelled"]
-    assert offers("cases", study, "--regime", "") == [*REGIME_SENTENCES][1:]
-    assert offers("explore", study, "--flag", "un") == ["unsettled"]
-    assert offers("retry", study, "--ending", "chat") == ["chatter"]
+    assert offers("show", study, "cases", "--sort", "shaft") == [], "no service answers"
+    assert offers("show", study, "cases", "--ending", "c") == [
+        "chatter",
+        "cannot_assemble",
+        "crashed",
+        "cancelled",
+    ]
+    assert offers("show", study, "cases", "--regime", "") == [*REGIME_SENTENCES][1:]
+    assert offers("show", study, "explore", "--flag", "un") == ["unsettled"]
+    assert offers("study", "retry", study, "--ending", "chat") == ["chatter"]
     assert offers("presets", "p") == ["press", "punching_press"]
     assert offers("list", "--sort", "n") == ["newest", "name"]
 
@@ -150,11 +157,11 @@ def test_every_ending_and_flag_is_offered() -> None:
 @pytest.mark.parametrize(
     ("shell", "variables", "expected"),
     [
-        ("zsh", {"_TYPER_COMPLETE_ARGS": "sprag exp"}, '"export":"Write all case rows'),
+        ("zsh", {"_TYPER_COMPLETE_ARGS": "sprag exp"}, '"export":"Write all'),
         (
             "fish",
             {"_TYPER_COMPLETE_ARGS": "sprag exp", "_TYPER_COMPLETE_FISH_ACTION": "get-args"},
-            "export\tWrite all case rows",
+            "export\tWrite all",
         ),
     ],
 )
@@ -178,7 +185,7 @@ def test_an_unknown_shell_is_refused(sprag: Sprag, monkeypatch: pytest.MonkeyPat
 
 
 def test_h_is_help(sprag: Sprag) -> None:
-    for command in ([], ["run"], ["db"], ["db", "upgrade"]):
+    for command in ([], ["run"], ["show"], ["show", "curves"], ["admin", "db"], ["admin", "db", "upgrade"]):
         done = sprag(*command, "-h")
         assert done.code == 0
         assert done.out == sprag(*command, "--help").out
@@ -186,16 +193,16 @@ def test_h_is_help(sprag: Sprag) -> None:
 
 
 def test_help_lists_every_command_with_its_first_sentence(sprag: Sprag) -> None:
-    commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+    commands = command_line("en").commands  # type: ignore[attr-defined]
     shown = " ".join(sprag("-h").out.split())
-    for name, command in commands.items():
-        assert f" {name} {command.get_short_help_str(limit=400)}" in shown
+    for name in commands:
+        assert f" {name} {commands.words[name].summary}" in shown
     assert "..." not in shown.replace("[ARGS]...", "")
-    titles = [shown.index(title) for title in ("Run here:", "Run a service:", "Use a running service:")]
+    titles = [shown.index(title) for title in ("Studies:", "A service:", "Administration:")]
     assert titles == sorted(titles)
 
 
 def test_a_group_without_a_command_shows_its_help(sprag: Sprag) -> None:
-    done = sprag("db")
+    done = sprag("admin", "db")
     assert (done.code, done.out) == (2, "")
-    assert done.err == sprag("db", "--help").out
+    assert done.err == sprag("admin", "db", "--help").out

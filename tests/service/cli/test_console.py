@@ -134,7 +134,7 @@ def test_points_of_a_map_with_flags_are_marked(capsys: pytest.CaptureFixture[str
     z = {"name": "efficiency", "unit": "1", "values": [[0.25, 0.5], [0.75, None]]}
     show_map({"x": x, "y": y, "z": z, "at": {}, "units": {}, "flags": [[[], ["not_settled"]], [[], ["not_settled"]]]})
     shown = capsys.readouterr()
-    assert [line.split()[1:] for line in shown.out.splitlines()[-3:-1]] == [["0.25", "0.5", "*"], ["0.75", "-", "*"]]
+    assert [line.split("\t")[1:] for line in shown.out.splitlines()[-2:]] == [["0.25", "0.5 *"], ["0.75", "- *"]]
     assert shown.err == "* flags: not_settled 2\n"
     show_map({"x": x, "y": y, "z": z, "at": {}, "units": {}})
     assert "*" not in capsys.readouterr().out
@@ -176,11 +176,20 @@ def test_a_bar_on_a_terminal_and_nothing_elsewhere() -> None:
 
 
 def test_an_id_is_never_cut(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sprag_study.service.cli.console._PLAIN_WIDTH", 80)
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", "80")
     columns = (("id", False, True), ("state", False, True), ("done", True), ("created", False), ("name", False))
     rows = [("st_38b213f6175b1470", "finished", 10**6, "2026-11-22T02:22:59.079014Z", "Feeder motor: speed " * 4)]
     show_table("", columns, rows)
     assert "st_38b213f6175b1470 " in capsys.readouterr().out
+
+
+def test_a_table_in_a_pipe_has_tabs_between_its_cells(capsys: pytest.CaptureFixture[str]) -> None:
+    columns = (("shaft.\nload [N*m]", True), ("mean speed\n[rad/s]", True), ("note", False))
+    show_table("Title", columns, [(0.25, None, "one\ttwo\nthree"), (12.0, 1e-9, "")])
+    assert capsys.readouterr().out == (
+        "Title\nshaft.load [N*m]\tmean speed [rad/s]\tnote\n0.25\t-\tone two three\n12\t1e-09\t\n"
+    )
 
 
 def test_endings_are_told_with_their_meaning() -> None:

@@ -1,4 +1,4 @@
-"""Which commands make a database, what `sprag db upgrade` asks for, and that answers name the database."""
+"""Which commands make a database, what `sprag admin db upgrade` asks for, and that answers name the database."""
 
 from __future__ import annotations
 
@@ -25,10 +25,15 @@ from tests.service.cli.test_changing_commands import CHANGING, OTHERS
 from tests.service.timed_spec import SPEC
 
 #: Those that make a database where there is none; `preview` and `doctor` say what there would be.
-CREATORS = {"serve", "run", "db upgrade"}
-SILENT = {"preview", "doctor"}
+CREATORS = {"serve", "run", "admin db upgrade"}
+SILENT = {"check", "admin doctor"}
 #: Arguments of the commands of `OTHERS`.
-ARGUMENTS = {"db backup": "copy.sqlite3", "db move": "target.sqlite3", "preview": "SPEC"}
+ARGUMENTS = {"admin db backup": "copy.sqlite3", "admin db move": "target.sqlite3", "check": "SPEC"} | {
+    **{f"show {name}": "SPEC" for name in ("front", "ribbon")},
+    "show map": "SPEC --x a --y b --z c",
+    "show sensitivity": "SPEC --y c",
+    "show yield": "SPEC c>0",
+}
 
 
 @pytest.fixture
@@ -61,7 +66,7 @@ def test_a_mistyped_database_is_not_made(
 def test_an_empty_database_is_not_made_into_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "empty.sqlite3"
     file.touch()
-    assert execute(["token", "create", "--name", "x", "--db", str(file)]) == 3
+    assert execute(["admin", "token", "create", "--name", "x", "--db", str(file)]) == 3
     assert "is empty" in capsys.readouterr().err
     session = Session(f"sqlite:///{file}", create=False)
     assert revision(session) is None
@@ -92,24 +97,24 @@ def sprag(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Iterator[Callab
         return capsys.readouterr()
 
     for name in ("dora", "ada"):
-        run("user", "add", name)
+        run("admin", "user", "add", name)
     return run
 
 
 @pytest.mark.parametrize(
     "command",
     [
-        "token create --name laptop",
-        "token list",
-        "user add emil",
-        "user list",
-        "user change dora --role viewer",
-        "user remove dora",
-        "user hand-over dora --to ada",
-        "db prune --older-than 3",
-        "db upgrade",
-        "db check",
-        "db backup COPY",
+        "admin token create --name laptop",
+        "admin token list",
+        "admin user add emil",
+        "admin user list",
+        "admin user change dora --role viewer",
+        "admin user remove dora",
+        "admin user hand-over dora --to ada",
+        "admin db prune --older-than 3",
+        "admin db upgrade",
+        "admin db check",
+        "admin db backup COPY",
     ],
 )
 def test_every_administrative_answer_names_the_database(
@@ -120,13 +125,13 @@ def test_every_administrative_answer_names_the_database(
 
     assert str(tmp_path / "known.sqlite3") in "".join(sprag(*words("a")))
     answer: dict[str, Any] = json.loads(
-        sprag(*words("b") if "add" not in command else ["user", "add", "ida"], "--json")[0]
+        sprag(*words("b") if "add" not in command else ["admin", "user", "add", "ida"], "--json")[0]
     )
     assert (answer.get("database") or answer["location"]) == str(tmp_path / "known.sqlite3")
 
 
 def test_an_upgrade_copies_the_file_before(old: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert execute(["db", "upgrade", "--db", str(old), "--json"]) == 0
+    assert execute(["admin", "db", "upgrade", "--db", str(old), "--json"]) == 0
     done = json.loads(capsys.readouterr().out)
     assert (done["before"], done["after"]) == ("0020", HEAD_REVISION)
     copy = Session(f"sqlite:///{done['backup']}")
@@ -134,12 +139,12 @@ def test_an_upgrade_copies_the_file_before(old: Path, tmp_path: Path, capsys: py
     copy.close()
     with Store.open(f"sqlite:///{old}") as store:
         assert store.session.path == old
-    assert execute(["db", "upgrade", "--db", str(old), "--json"]) == 0
+    assert execute(["admin", "db", "upgrade", "--db", str(old), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["backup"] is None, "nothing to do"
 
 
 def test_an_upgrade_can_do_without_the_copy(old: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert execute(["db", "upgrade", "--no-backup", "--db", str(old), "--json"]) == 0
+    assert execute(["admin", "db", "upgrade", "--no-backup", "--db", str(old), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["backup"] is None
     assert list(old.parent.glob("*.backup")) == []
 
@@ -155,7 +160,7 @@ def test_an_upgrade_is_refused_while_anybody_has_the_database_open(
     if state != "idle":
         other.execute({"reading": "BEGIN", "writing": "BEGIN IMMEDIATE"}[state])
         other.execute("SELECT count(*) FROM studies").fetchone()
-    assert execute(["db", "upgrade", "--db", str(old)]) == 3
+    assert execute(["admin", "db", "upgrade", "--db", str(old)]) == 3
     assert "is in use" in capsys.readouterr().err
     other.close()
     assert list(old.parent.glob("*.backup")) == []
@@ -163,7 +168,7 @@ def test_an_upgrade_is_refused_while_anybody_has_the_database_open(
     assert revision(session) == "0020"
     session.close()
     assert len(before) <= old.stat().st_size
-    assert execute(["db", "upgrade", "--db", str(old)]) == 0
+    assert execute(["admin", "db", "upgrade", "--db", str(old)]) == 0
 
 
 def test_an_upgrade_on_a_server_is_refused_while_anybody_is_connected(
@@ -172,12 +177,12 @@ def test_an_upgrade_on_a_server_is_refused_while_anybody_is_connected(
     store = Store.open(postgres_url)
     with store.session.write() as connection:
         connection.exec_driver_sql("UPDATE alembic_version SET version_num = '0030'")
-    assert execute(["db", "upgrade", "--db", postgres_url]) == 3
+    assert execute(["admin", "db", "upgrade", "--db", postgres_url]) == 3
     assert "is in use by connection" in capsys.readouterr().err
     with store.session.write() as connection:
         connection.exec_driver_sql(f"UPDATE alembic_version SET version_num = '{HEAD_REVISION}'")
     store.close()
-    assert execute(["db", "upgrade", "--db", postgres_url]) == 0
+    assert execute(["admin", "db", "upgrade", "--db", postgres_url]) == 0
 
 
 @pytest.mark.parametrize("command", ["backup", "move"])
@@ -194,7 +199,7 @@ def test_copies_of_a_database_name_rows_that_changed_on_the_disk(
     connection.execute(f"UPDATE {name} SET flags = 'odd' WHERE case_number = 0")
     connection.commit()
     connection.close()
-    assert execute(["db", command, str(target), "--db", str(database)]) == 3
+    assert execute(["admin", "db", command, str(target), "--db", str(database)]) == 3
     told = capsys.readouterr()
     assert f"the rows of the study {record.id}, cases 0 to {last}, are not those that were stored" in told.err
     with Store.open(f"sqlite:///{target}") as store:

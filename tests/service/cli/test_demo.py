@@ -33,11 +33,11 @@ def process(monkeypatch: pytest.MonkeyPatch) -> Process:
         yield "http://127.0.0.1:1", started
 
     monkeypatch.setattr(demo, "_service", service)
-    monkeypatch.setattr(demo, "connection", lambda *_: nullcontext())
+    monkeypatch.setattr(demo, "served_by", lambda *_: nullcontext())
     return started
 
 
-@pytest.mark.parametrize(("ok", "code"), [(512, 0), (511, 1)])
+@pytest.mark.parametrize(("ok", "code"), [(512, 0), (511, 4)])
 def test_it_serves_on_unless_it_is_told_to_stop(
     process: Process,
     ok: int,

@@ -1,4 +1,4 @@
-"""The commands `sprag regimes`, `basin`, `diagram` and `section`, and `sprag run` from the end of a case."""
+"""The commands `sprag show ID regimes`, `basin`, `diagram` and `section`, and `sprag run` from the end of a case."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SPEED = "shaft.initial_speed"
 
 def test_the_example_of_the_guide(sprag: Sprag, examples: Path) -> None:
     guide = (examples.parent / "docs" / "starts.md").read_text(encoding="utf-8")
-    command = next(line for line in guide.splitlines() if line.startswith("    sprag regimes "))
+    command = next(line for line in guide.splitlines() if line.startswith("    sprag show "))
     words = shlex.split(command)[1:]
     words[1] = str(examples / Path(words[1]).name)
     done = sprag(*words)
@@ -30,12 +30,14 @@ def test_the_example_of_the_guide(sprag: Sprag, examples: Path) -> None:
 def test_tables_of_one_case(sprag: Sprag, tmp_path: Path) -> None:
     spec = tmp_path / "spec.json"
     spec.write_text(json.dumps(changed({"/run": {}, "/axes": [{"path": "shaft.load", "values": [0.2, 0.3]}]})), "utf-8")
-    diagram = json.loads(sprag("diagram", spec, "--along", "shaft.load", "--values", 2, "--strobes", 4, "--json").out)
+    diagram = json.loads(
+        sprag("show", spec, "diagram", "--along", "shaft.load", "--values", 2, "--strobes", 4, "--json").out
+    )
     assert (diagram["parameter"], diagram["order"]) == ([0.2, 0.3], [2, 1])
-    section = sprag("section", spec, "--strobes", 4).out.splitlines()
+    section = sprag("show", spec, "section", "--strobes", 4).out.splitlines()
     assert [line.split(",")[:2] for line in section] == [["regime", "order"], *[["periodic", "2"]] * 2]
     ranges = ("--x-from", 0, "--x-to", "5 rad/s", "--y-from", -0.1, "--y-to", 0.1)
-    grid = sprag("basin", spec, "--x", SPEED, "--y", "pendulums.0.initial_angle", *ranges, "--grid", 2).out
+    grid = sprag("show", spec, "basin", "--x", SPEED, "--y", "pendulums.0.initial_angle", *ranges, "--grid", 2).out
     assert [line.split(",")[2] for line in grid.splitlines()] == ["regime.number", "0", "0", "0", "0"]
 
 

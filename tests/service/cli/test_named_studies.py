@@ -73,21 +73,21 @@ def test_what_names_a_study(service: Service, portal: BlockingPortal, spec: dict
 
 
 def test_an_unknown_name_is_refused_by_the_service(service: Service, sprag: Sprag, here: None) -> None:
-    done = sprag("cancel", "nothing")
+    done = sprag("study", "cancel", "nothing")
     assert done.code == 2
     assert "nothing" in done.err
 
 
 def test_a_study_is_deleted_after_asking(service: Service, sprag: Sprag, here: None, spec: dict[str, Any]) -> None:
     study_id = submit(service, spec, "old")
-    done = sprag("delete", "old", "--yes")
+    done = sprag("study", "delete", "old", "--yes")
     assert (done.code, service.http.get(f"{API}/studies/{study_id}").status_code) == (2, 200), "it has not ended"
     service.fill(study_id)
-    done = sprag("delete", "old", "--json")
+    done = sprag("study", "delete", "old", "--json")
     assert done.code == 2
     assert json.loads(done.err)["problems"][0]["code"] == "required", "nobody can be asked here"
     assert service.http.get(f"{API}/studies/{study_id}").status_code == 200
-    done = sprag("delete", "old", "--yes", "--json")
+    done = sprag("study", "delete", "old", "--yes", "--json")
     assert (done.code, json.loads(done.out)) == (0, {"deleted": study_id})
     assert service.http.get(f"{API}/studies/{study_id}").status_code == 404
 
@@ -99,16 +99,16 @@ def test_a_deleted_study_is_deleted_for_good_by_its_whole_id(
     for study_id in (kept, gone):
         service.fill(study_id)
         cases = service.get(f"/studies/{study_id}")["progress"]["done"]
-        assert sprag("delete", study_id, "--yes").code == 0
+        assert sprag("study", "delete", study_id, "--yes").code == 0
     for named in ("old", gone[:-1], "st_0000000000000000"):  # names and beginnings mean studies that are there
-        assert sprag("delete", named, "--yes", "--at-once").code == 2, named
-    assert sprag("delete", gone, "--yes").code == 2
-    assert sprag("restore", gone).code == 0
-    assert sprag("delete", gone, "--yes").code == 0
-    assert sprag("delete", gone, "--at-once", "--json").code == 2, "nobody can be asked here"
-    done = sprag("delete", gone, "--yes", "--at-once")
+        assert sprag("study", "delete", named, "--yes", "--at-once").code == 2, named
+    assert sprag("study", "delete", gone, "--yes").code == 2
+    assert sprag("study", "restore", gone).code == 0
+    assert sprag("study", "delete", gone, "--yes").code == 0
+    assert sprag("study", "delete", gone, "--at-once", "--json").code == 2, "nobody can be asked here"
+    done = sprag("study", "delete", gone, "--yes", "--at-once")
     assert (done.code, done.out + done.err) == (0, f"{gone} (old, {cases} cases) is deleted\n")
-    assert sprag("restore", gone).code == 2
+    assert sprag("study", "restore", gone).code == 2
     assert [study["id"] for study in json.loads(sprag("list", "--deleted", "--json").out)["studies"]] == [kept]
 
 
@@ -117,31 +117,31 @@ def test_a_case_and_its_motions(
 ) -> None:
     spec["run"] = {"duration": "12 periods", "window": ["6 periods", "12 periods"]}
     service.fill(study := submit(service, spec, "short"))
-    done = sprag("case", "short", 4)
+    done = sprag("show", "short", "case", "--case", 4)
     assert done.code == 0
     assert done.err.startswith("case 4: chatter.")
     words = done.out.split()
     assert words[words.index("excitation.frequency") + 2] == "Hz"
     assert words[words.index("shaft.speed.mean") + 1 :][:2] == ["-", "rad/s"]
-    case = json.loads(sprag("case", "short", 3, "--json").out)
+    case = json.loads(sprag("show", "short", "case", "--case", 3, "--json").out)
     assert case["case"] == 3
     numbers = [name for name, value in case["results"].items() if not isinstance(value, str)]
     assert {*case["parameters"], *numbers} <= {*case["units"]}
     assert service.get(f"/studies/{study}/cases")["units"] == case["units"]
-    listed = sprag("cases", "short", "--result", "torque.mean").out
+    listed = sprag("show", "short", "cases", "--result", "torque.mean").out
     assert {"[N*m]", "[Hz]"} <= {*listed.split()}
 
-    done = sprag("case", "short", 4, "trajectory", "--set", "from=6 periods", "--set", "points=20")
+    done = sprag("show", "short", "trajectory", "--case", 4, "--from", "6 periods", "--points", 20)
     rows = list(csv.DictReader(io.StringIO(done.out)))
     assert len(rows) == 20
     file = tmp_path / "strobes.svg"
-    assert sprag("case", "short", 4, "strobes", "-o", file).code == 0
+    assert sprag("show", "short", "strobes", "--case", 4, "-o", file).code == 0
     assert file.read_bytes().startswith(b"<?xml")
-    done = sprag("case", "short", 4, "trajectory", "--set", "pionts=20")
+    done = sprag("show", "short", "trajectory", "--case", 4, "--pionts", 20)
     assert done.code == 2
     assert "--pionts" in done.err
-    for wrong in (("--set", "points=20"), ("-o", file), ("trajectory", "--set", "points")):
-        done = sprag("case", "short", 4, *wrong)
+    for wrong in (("--points", "20"), ("-o", file), ("trajectory", "--points")):
+        done = sprag("show", "short", *wrong, "--case", 4) if len(wrong) > 2 else sprag("show", "short", "case", *wrong)
         assert (done.code, done.out) == (2, ""), wrong
 
 
@@ -166,10 +166,10 @@ def test_tables_of_commands_fit_the_terminal(
 def test_times_are_shown_in_seconds(service: Service, sprag: Sprag, here: None, spec: dict[str, Any]) -> None:
     created = service.get(f"/studies/{submit(service, spec, 'feeder')}")["created_at"]
     shown = sprag("list").out
-    assert f" {created[:19]}Z " in shown
+    assert f"\t{created[:19]}Z\t" in shown
     assert json.loads(sprag("list", "--json").out)["studies"][0]["created_at"] == created
     service.fill(submit(service, spec, "old"))
-    assert sprag("delete", "old", "--yes").code == 0
+    assert sprag("study", "delete", "old", "--yes").code == 0
     assert re.search(r"T\d\d:\d\d:\d\dZ", sprag("list", "--deleted").out)
 
 
@@ -213,8 +213,8 @@ def test_models_and_rounds(service: Service, sprag: Sprag, here: None, spec: dic
     assert "excitation.frequency" in sprag("models", "vibration-drive").out
     assert sprag("models", "perpetuum-mobile").code == 2
     submit(service, spec, "plain")
-    assert json.loads(sprag("rounds", "plain", "--json").out)["rounds"] == []
-    assert "first case" in sprag("rounds", "plain").out
+    assert json.loads(sprag("show", "plain", "rounds", "--json").out)["rounds"] == []
+    assert "first case" in sprag("show", "plain", "rounds").out
 
 
 def test_settings_say_where_they_come_from(sprag: Sprag, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -286,7 +286,7 @@ def test_a_study_is_kept_where_the_answer_is_no(
 ) -> None:
     study = submit(service, spec, "Feeder")
     monkeypatch.setattr("sys.stdin.isatty", lambda: True)
-    monkeypatch.setattr("sprag_study.service.cli.studies.confirmed", lambda _question: False)
-    assert execute(["delete", study, "--server", "http://localhost"]) == 0
+    monkeypatch.setattr("sprag_study.service.cli.study.confirmed", lambda _question: False)
+    assert execute(["study", "delete", study, "--server", "http://localhost"]) == 0
     assert "nothing is deleted" in capsys.readouterr().err
     assert service.http.get(f"{API}/studies/{study}").status_code == 200

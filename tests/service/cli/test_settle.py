@@ -1,4 +1,4 @@
-"""The command `sprag settle`."""
+"""The command `sprag show ID settled`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _DRIVE = "one_pendulum.json"
 
 
 def test_one_case_is_shown_with_its_regime(sprag: Sprag, examples: Path) -> None:
-    done = sprag("settle", examples / _DRIVE, "--case", 178)
+    done = sprag("show", "settled", examples / _DRIVE, "--case", 178)
     assert done.code == 0
     assert "22.835" in done.out
     assert motion_sentence("periodic", 2) in " ".join(done.out.split())
@@ -31,7 +31,7 @@ def test_one_case_is_shown_with_its_regime(sprag: Sprag, examples: Path) -> None
 
 def test_rows_have_parameters_ending_regime_and_every_result(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
     file = tmp_path / "settled.csv"
-    assert sprag("settle", examples / _DRIVE, "--case", 178, "--case", 176, "-o", file).code == 0
+    assert sprag("show", "settled", examples / _DRIVE, "--case", 178, "--case", 176, "-o", file).code == 0
     rows = list(csv.DictReader(io.StringIO(file.read_text(encoding="utf-8"))))
     assert [row["case"] for row in rows] == ["178", "176"]
     assert [row["regime"] for row in rows] == ["periodic", "coasting"]
@@ -42,7 +42,7 @@ def test_rows_have_parameters_ending_regime_and_every_result(sprag: Sprag, examp
 
 
 def test_json_is_null_where_there_is_no_value(sprag: Sprag, examples: Path) -> None:
-    (row,) = sprag("settle", examples / _DRIVE, "--case", 178, "--json").data
+    (row,) = sprag("show", "settled", examples / _DRIVE, "--case", 178, "--json").data
     assert row["results"]["regime"] == "periodic"
     assert row["results"]["regime.order"] == 2
     assert row["results"]["regime.exponent"] is None
@@ -50,19 +50,19 @@ def test_json_is_null_where_there_is_no_value(sprag: Sprag, examples: Path) -> N
 
 def test_every_regime_of_a_case_with_many_starts_is_shown(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
     spec = examples / "coexisting_motions.json"
-    done = sprag("settle", spec, "--case", 2)
+    done = sprag("show", spec, "settled", "--case", 2)
     assert "2 regimes, to which its 32 starts come" in done.out
     assert "2 periodic" in done.err
-    share = next(line for line in done.out.splitlines() if "regime.share " in line)
+    share = next(line for line in done.out.splitlines() if line.startswith("regime.share\t"))
     assert ("0.625" in share, "0.375" in share) == (True, True)
     file = tmp_path / "settled.csv"
-    sprag("settle", spec, "--case", 2, "--case", 0, "-o", file)
+    sprag("show", spec, "settled", "--case", 2, "--case", 0, "-o", file)
     rows = list(csv.DictReader(io.StringIO(file.read_text(encoding="utf-8"))))
     assert [(row["case"], row["regime.number"]) for row in rows] == [("2", "0"), ("2", "1"), ("0", "0")]
     assert [float(row["shaft.speed.mean"]) for row in rows[:2]] == pytest.approx([0.392266, 0.558988], abs=1e-6)
-    listed = sprag("settle", spec, "--case", 2, "--json").data
+    listed = sprag("show", spec, "settled", "--case", 2, "--json").data
     assert [row["results"]["regime.start"] for row in listed] == [0, 1]
-    told = sprag("settle", spec, "--case", 2, "--case", 0, "-o", tmp_path / "settled.json", "--json").data
+    told = sprag("show", spec, "settled", "--case", 2, "--case", 0, "-o", tmp_path / "settled.json", "--json").data
     assert (told["cases"], told["regimes"], told["endings"]) == (2, {"periodic": 3}, {"ok": 2})
 
 
@@ -75,7 +75,7 @@ def test_every_regime_of_a_case_with_many_starts_is_shown(sprag: Sprag, examples
     ],
 )
 def test_what_cannot_be_settled_is_refused(sprag: Sprag, examples: Path, arguments: tuple[Any, ...], told: str) -> None:
-    done = sprag("settle", examples / arguments[0], *arguments[1:])
+    done = sprag("show", "settled", examples / arguments[0], *arguments[1:])
     assert done.code == 2
     assert told in done.err
     assert done.out == ""
@@ -87,6 +87,6 @@ def test_a_case_that_ends_otherwise_is_told(sprag: Sprag, examples: Path, tmp_pa
     spec["base"]["shaft"] |= {"inertia": 1e-9}
     path = tmp_path / "spec.json"
     path.write_text(json.dumps(spec), encoding="utf-8")
-    (row,) = sprag("settle", path, "--case", 178, "--json", "--at-most", 100).data
+    (row,) = sprag("show", path, "settled", "--case", 178, "--json", "--at-most", 100).data
     assert row["ending"] != "ok"
     assert set(row["results"].values()) == {None}

@@ -22,9 +22,9 @@ def test_a_csv_file_takes_the_place_of_a_table(sprag: Sprag, examples: Path, tmp
     spec = read_spec(str(examples / "press.toml"), files=[f"operation={table}"])
     assert isinstance(spec, dict)
     assert spec["base"]["operation"] == {"quantity": "force", "over": "angle", "csv": table.read_text(encoding="utf-8")}
-    assert sprag("validate", examples / "press.toml", "--file", f"operation={table}").code == 0
+    assert sprag("check", examples / "press.toml", "--file", f"operation={table}").code == 0
     table.write_text("angle [deg];F [kN]\n0;0\n120;x\n", encoding="utf-8")
-    wrong = sprag("validate", examples / "press.toml", "--file", f"operation={table}", "--json")
+    wrong = sprag("check", examples / "press.toml", "--file", f"operation={table}", "--json")
     (problem,) = json.loads(wrong.out)["problems"]
     assert (problem["pointer"], wrong.code) == ("/base/operation/csv", 2)
     assert problem["message"].startswith("line 3, column value")
@@ -99,4 +99,4 @@ def test_a_machine_with_an_inertia_from_a_file_runs(sprag: Sprag, examples: Path
     spec = tmp_path / "spec.json"
     base = {"mean_speed": 10, "drive": {"inertia": 20}, "mechanism": {"scotch_yoke": {"crank": 0.1, "yoke_mass": 5}}}
     spec.write_text(json.dumps({"sprag": 1, "model": "machine-shaft", "base": base}), encoding="utf-8")
-    assert sprag("validate", spec, "--file", f"mechanism={table}").code == 0
+    assert sprag("check", spec, "--file", f"mechanism={table}").code == 0

@@ -1,4 +1,4 @@
-"""``sprag token``: a secret alone; tokens created, listed, revoked in the database of the settings."""
+"""``sprag admin token``: a secret alone; tokens created, listed, revoked in the database of the settings."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 def test_tokens_are_created_listed_and_revoked(settings: Settings, capsys: pytest.CaptureFixture[str]) -> None:
     def run(*arguments: str) -> tuple[int, str, str]:
-        code = execute(["token", *arguments])
+        code = execute(["admin", "token", *arguments])
         captured = capsys.readouterr()
         return code, captured.out, captured.err
 
@@ -66,11 +66,11 @@ def test_the_list_marks_every_token_that_lets_nobody_in(settings: Settings, spra
         store.people.revoke_token(made["revoked"][1].id)
         store.people.change_user("emil", removed=True)
     db = ("--db", settings.database)
-    listed = sprag("token", "list", "--json", *db).data["tokens"]
+    listed = sprag("admin", "token", "list", "--json", *db).data["tokens"]
     assert {token["id"]: token["state"] for token in listed} == {
         record.id: state for state, (_, record) in made.items()
     }
-    lines = sprag("token", "list", *db).out.splitlines()
+    lines = sprag("admin", "token", "list", *db).out.splitlines()
     words = {"valid": "valid", "expired": "expired", "user-removed": "its user is removed", "revoked": "revoked"}
     for state, (_, record) in made.items():
         (line,) = [line for line in lines if record.id in line]
@@ -80,9 +80,9 @@ def test_the_list_marks_every_token_that_lets_nobody_in(settings: Settings, spra
 
 
 def test_alone_it_makes_a_secret_and_keeps_nothing(capsys: pytest.CaptureFixture[str]) -> None:
-    assert execute(["token"]) == 0
+    assert execute(["admin", "token"]) == 0
     first = capsys.readouterr().out.strip()
-    assert execute(["token", "--json"]) == 0
+    assert execute(["admin", "token", "--json"]) == 0
     second = json.loads(capsys.readouterr().out)["token"]
     assert len(first) == len(second) == 43
     assert first != second
@@ -91,21 +91,23 @@ def test_alone_it_makes_a_secret_and_keeps_nothing(capsys: pytest.CaptureFixture
 def test_tokens_and_users_are_named_by_their_beginnings(settings: Settings, sprag: Callable[..., Any]) -> None:
     db = ("--db", settings.database)
     for name in ("dora", "dorothea"):
-        assert sprag("user", "add", name, *db).code == 0
+        assert sprag("admin", "user", "add", name, *db).code == 0
     made = [
-        json.loads(sprag("token", "create", "--name", name, "--user", user, "--json", *db).out)
+        json.loads(sprag("admin", "token", "create", "--name", name, "--user", user, "--json", *db).out)
         for name, user in (("laptop", "dorot"), ("laptop, old", "dora"))
     ]
     assert [token["user"] for token in made] == ["dorothea", "dora"]
-    several = sprag("token", "revoke", "lap", "--json", *db)
+    several = sprag("admin", "token", "revoke", "lap", "--json", *db)
     (problem,) = several.failure["problems"]
     assert (several.code, problem["pointer"], problem["code"]) == (2, "ID", "ambiguous")
     for text, token in (("laptop", made[0]), ("lap", made[1]), (made[0]["id"], made[0])):
-        assert json.loads(sprag("token", "revoke", text, "--json", *db).out)["id"] == token["id"]
-    several = sprag("user", "hand-over", "dora", "--to", "d", "--json", *db)
+        assert json.loads(sprag("admin", "token", "revoke", text, "--json", *db).out)["id"] == token["id"]
+    several = sprag("admin", "user", "hand-over", "dora", "--to", "d", "--json", *db)
     (problem,) = several.failure["problems"]
     assert (several.code, problem["pointer"], problem["message"]) == (2, "--to", "fits several users")
-    assert sprag("user", "remove", "doro", *db).code == 0
-    assert sprag("user", "restore", "doro", *db).code == 0
-    assert sprag("user", "change", "", "--role", "viewer", *db).code == 2
-    assert sprag("user", "change", "emil", "--role", "viewer", "--json", *db).failure["code"] == "user-not-found"
+    assert sprag("admin", "user", "remove", "doro", *db).code == 0
+    assert sprag("admin", "user", "restore", "doro", *db).code == 0
+    assert sprag("admin", "user", "change", "", "--role", "viewer", *db).code == 2
+    assert (
+        sprag("admin", "user", "change", "emil", "--role", "viewer", "--json", *db).failure["code"] == "user-not-found"
+    )

@@ -1,4 +1,4 @@
-"""The command `sprag transient`."""
+"""The command `sprag show ID transient`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,11 @@ Sprag = Callable[..., Finished]
 
 def test_the_example_of_the_guide(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
     guide = (examples.parent / "docs" / "guide-machine-shaft.md").read_text(encoding="utf-8")
-    commands = [line.split() for line in guide.splitlines() if line.startswith("    sprag transient ")]
+    commands = [
+        line.split()
+        for line in guide.splitlines()
+        if line.startswith("    sprag show examples/slotter.toml transient ")
+    ]
     (shown,) = (block.split("```")[0] for block in guide.split("```text\n")[1:] if block.startswith("case 9"))
     for words, line in zip(commands, shown.splitlines(), strict=True):
         own = shlex.split(" ".join(words[1:]))
@@ -31,14 +35,14 @@ def test_the_example_of_the_guide(sprag: Sprag, examples: Path, tmp_path: Path) 
 
 def test_json_and_the_exit_code_of_a_stall(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
     """Case 27 cuts with 40 kN, which stalls the motor wherever the shaft starts."""
-    done = sprag("transient", examples / "slotter.toml", "--case", 27, "--kind", "run-up", "--format", "json")
+    done = sprag("show", examples / "slotter.toml", "transient", "--case", 27, "--kind", "run-up", "--format", "json")
     made = json.loads(done.out)
-    assert done.code == 1
+    assert done.code == 4
     assert (made["outcome"], made["ending"], made["results"]["time"]) == ("stopped", "motor_stalled", None)
     assert "the mean resisting torque" in made["cause"]
     file = tmp_path / "motion.csv"
     words = ("--case", 27, "--kind", "run-up", "--json", "-o", file)
-    short = json.loads(sprag("transient", examples / "slotter.toml", *words).out)
+    short = json.loads(sprag("show", examples / "slotter.toml", "transient", *words).out)
     assert (short["file"], short["results"]) == (str(file), made["results"])
     assert float(next(csv.DictReader(file.read_text(encoding="utf-8").splitlines()))["omega"]) == 0.0
 
@@ -52,7 +56,7 @@ def test_json_and_the_exit_code_of_a_stall(sprag: Sprag, examples: Path, tmp_pat
     ],
 )
 def test_refusals(sprag: Sprag, examples: Path, spec: str, words: tuple[object, ...], said: str) -> None:
-    done = sprag("transient", examples / spec, *words)
+    done = sprag("show", "transient", examples / spec, *words)
     assert done.code == 2
     assert said in done.err
 
@@ -83,8 +87,8 @@ def test_a_row_for_each_case_of_a_study(sprag: Sprag, tmp_path: Path) -> None:
     assert [float(row["time"]) for row in rows] == pytest.approx([1.0, 2.0, 4.0], rel=1e-12)
     lines = [json.loads(line) for line in sprag(*words, "--format", "json").out.splitlines()]
     assert [line["time"] for line in lines] == [float(row["time"]) for row in rows]
-    stalled = sprag("transient", spec, "--kind", "run-up", "--torque", "2 N*m", "--all")
-    assert stalled.code == 1
+    stalled = sprag("show", spec, "transient", "--kind", "run-up", "--torque", "2 N*m", "--all")
+    assert stalled.code == 4
     assert stalled.err.splitlines()[-1] == "3 cases: 3 not_started"
     assert {row["time"] for row in csv.DictReader(stalled.out.splitlines())} == {""}
     both = sprag(*words, "--case", 1)

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 import typer
-from typer.main import get_command
 
 from sprag_study.service import languages
 from sprag_study.service.cli import case_views, study_views
-from sprag_study.service.cli.app import app
+from sprag_study.service.cli.app import command_line
 from sprag_study.service.views.answers import AnswersView
 from sprag_study.service.views.case_questions import CASE_VIEWS
 from sprag_study.service.views.cases import CASE_VIEWS as VIEWS_OF_CASES
@@ -51,7 +50,7 @@ def sources(
 @pytest.mark.parametrize(
     ("command", "options"),
     [
-        ("curve", ("--y", "shaft.speed.mean", "--y", "efficiency")),
+        ("curves", ("--y", "shaft.speed.mean", "--y", "efficiency")),
         ("answers", ("--point", "100 N*mm")),
         ("explore", ("--where", "shaft.load >= 0.1", "--sort=-efficiency")),
         ("sensitivity", ("--y", "shaft.speed.mean")),
@@ -60,19 +59,19 @@ def sources(
 def test_views_of_a_study(
     sprag: Callable[..., Finished], sources: tuple[Path, str], tmp_path: Path, command: str, options: tuple[str, ...]
 ) -> None:
-    here, there = (_answer(sprag(command, source, *options, "--json")) for source in sources)
+    here, there = (_answer(sprag("show", source, command, *options, "--json")) for source in sources)
     assert here == there
     tables = []
     for number, source in enumerate(sources):
         file = tmp_path / f"{number}.csv"
-        assert sprag(command, source, *options, "-o", file, "--units", "rpm").code == 0
+        assert sprag("show", source, command, *options, "-o", file, "--units", "rpm").code == 0
         tables.append(file.read_bytes())
     assert tables[0] == tables[1]
 
 
 def test_views_of_a_case(sprag: Callable[..., Finished], sources: tuple[Path, str], tmp_path: Path) -> None:
     for name, options in (("trajectory", ("--points", 5)), ("engagements", ()), ("strobes", ("--table", "strobes"))):
-        here, there = (sprag(name, source, "--case", 1, *options, "--json") for source in sources)
+        here, there = (sprag("show", source, name, "--case", 1, *options, "--json") for source in sources)
         assert (here.code, there.code) == (0, 0), here.err + there.err
         assert json.loads(here.out) == json.loads(there.out)
     pictures = []
@@ -80,13 +79,13 @@ def test_views_of_a_case(sprag: Callable[..., Finished], sources: tuple[Path, st
         file = tmp_path / f"{number}.svg"
         for options in ((), ("--language", "uk")):
             with languages.language("uk"):  # that of the command, which pictures have only where it is asked for
-                assert sprag("strobes", source, "--case", 1, "-o", file, *options).code == 0
+                assert sprag("show", source, "strobes", "--case", 1, "-o", file, *options).code == 0
             pictures.append(file.read_text())
     assert pictures[:2] == pictures[2:]
     assert [bool(re.search("[а-яі]{3}", picture)) for picture in pictures[:2]] == [False, True]
-    refused = sprag("engagements", sources[0], "-o", tmp_path / "wrong.svg")
+    refused = sprag("show", sources[0], "engagements", "-o", tmp_path / "wrong.svg")
     assert (refused.code, "a name that ends in .csv, .json" in refused.err) == (2, True)
-    refused = sprag("transient", sources[1], "--kind", "run-up", "--all")
+    refused = sprag("show", sources[1], "transient", "--kind", "run-up", "--all")
     assert (refused.code, "--all: belongs to a spec" in refused.err) == (2, True)
 
 
@@ -100,31 +99,31 @@ def _answer(done: Finished) -> dict[str, Any]:
 def test_wrong_settings_name_their_options(
     sprag: Callable[..., Finished], sources: tuple[Path, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    done = sprag("curve", sources[0], "--x", "shaft.lode")
+    done = sprag("show", sources[0], "curves", "--x", "shaft.lode")
     assert done.code == 2
     assert "--x: not an axis of this study; did you mean 'shaft.load'?" in done.err
-    done = sprag("ribbon", sources[0], "--quantile", "105%")
+    done = sprag("show", sources[0], "ribbon", "--quantile", "105%")
     assert (done.code, "--quantile: is no probability" in done.err) == (2, True)
 
     def run(*_: object, **__: object) -> None:
         raise AssertionError("the study is run before what is wrong is told")
 
     monkeypatch.setattr(study_views, "run_parsed", run)
-    done = sprag("front", sources[0])
+    done = sprag("show", sources[0], "front")
     assert (done.code, "(the whole spec): the study has no goal" in done.err) == (2, True)
     for arguments, named in (
-        (("curve", "--x", "nonsense"), "--x"), (("curve", "--y", "nonsense"), "--y"),
-        (("curve", "--at", "shaft.load=9 N*m"), "--at"), (("curve", "--rest", "bogus"), "--rest"),
+        (("curves", "--x", "nonsense"), "--x"), (("curves", "--y", "nonsense"), "--y"),
+        (("curves", "--at", "shaft.load=9 N*m"), "--at"), (("curves", "--rest", "bogus"), "--rest"),
         (("map", "--x", "shaft.load", "--y", "nonsense", "--z", "efficiency"), "--y"),
         (("answers", "--point", "3 kg"), "--point"), (("explore", "--where", "nonsense > 3"), "--where"),
         (("sensitivity", "--y", "nonsense"), "--y"), (("ribbon", "--y", "nonsense"), "--y"),
-        (("yield", "nonsense > 3"), "--condition"), (("curve", "-o", "a.svg", "--language", "xx"), "--language"),
-        (("curve", "-o", "a.csv", "--units", "bogus"), "--units"),
+        (("yield", "nonsense > 3"), "--condition"), (("curves", "-o", "a.svg", "--language", "xx"), "--language"),
+        (("curves", "-o", "a.csv", "--units", "bogus"), "--units"),
     ):  # fmt: skip
-        done = sprag(arguments[0], sources[0], *arguments[1:])
+        done = sprag("show", sources[0], *arguments)
         assert (done.code, named in done.err) == (2, True), (arguments, done.err)
     monkeypatch.setattr("sprag_study.service.views.case_view.see", run)
-    done = sprag("strobes", sources[0], "-o", "a.svg", "--language", "xx")
+    done = sprag("show", sources[0], "strobes", "-o", "a.svg", "--language", "xx")
     assert (done.code, "--language: unknown language" in done.err) == (2, True), done.err
 
 
@@ -134,11 +133,11 @@ def test_what_is_written_is_said_here_and_by_a_service(
     for source in sources:
         for name, form, said in (("strobes", "svg", "picture"), ("trajectory", "csv", "table")):
             file = tmp_path / f"file.{form}"
-            done = sprag(name, source, "--case", 1, "-o", file, "--json")
+            done = sprag("show", source, name, "--case", 1, "-o", file, "--json")
             assert done.err.splitlines()[-1] == f"{said}: {file}", source
             told = json.loads(done.out)
             assert (told["file"], told["case"]) == (str(file), 1)
-            assert sprag(name, source, "--case", 1, "-o", file).out == ""
+            assert sprag("show", source, name, "--case", 1, "-o", file).out == ""
 
 
 def test_a_view_of_a_spec_is_found_once_for_table_and_file(
@@ -154,7 +153,7 @@ def test_a_view_of_a_spec_is_found_once_for_table_and_file(
     monkeypatch.setattr(AnswersView, "find", find)
     for form in ("csv", "svg"):
         found.clear()
-        assert sprag("answers", sources[0], "-o", tmp_path / f"file.{form}").code == 0
+        assert sprag("show", sources[0], "answers", "-o", tmp_path / f"file.{form}").code == 0
         assert found == [True]
 
 
@@ -163,16 +162,16 @@ def test_choices_are_in_the_help_and_completed(sprag: Callable[..., Finished]) -
         ("transient", "kind", ["run-up", "load-step", "coasting"]), ("strobes", "table", ["strobes", "orbit"]),
         ("map", "kind", ["heatmap", "contour"]),
     ):  # fmt: skip
-        assert f"[{'|'.join(choices)}]" in sprag(command, "--help").out
-        (option,) = (one for one in get_command(app).commands[command].params if one.name == name)  # type: ignore[attr-defined]
-        context = typer.Context(get_command(app))
+        assert f"[{'|'.join(choices)}]" in sprag("show", command, "--help").out
+        (option,) = (one for one in command_line("en").commands["show"].commands[command].params if one.name == name)  # type: ignore[attr-defined]
+        context = typer.Context(command_line("en"))
         first = choices[0]
         assert [item.value for item in option.shell_complete(context, first[:2])] == [first]
 
 
 def test_every_view_has_a_command_with_its_settings() -> None:
-    commands = get_command(app).commands  # type: ignore[attr-defined]
-    named = {**{name: name for name in commands}, "curve": "curves"}
+    commands = command_line("en").commands["show"].commands  # type: ignore[attr-defined]
+    named = {name: name for name in commands}
     abouts = {about.name: about for about in CASE_VIEWS} | {name: view.about for name, view in STUDY_VIEWS.items()}
     assert {about.name for about in CASE_VIEWS} == set(VIEWS_OF_CASES)
     for command, view in named.items():

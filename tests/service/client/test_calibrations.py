@@ -40,14 +40,14 @@ def test_both_clients_and_the_command_give_a_calibration(
     assert portal.call(partial(asynchronous, service, study_id)) == found
 
     connected(study_views)
-    shown = sprag("calibration", study_id, "-o", tmp_path / "points.csv")
+    shown = sprag("show", study_id, "calibration", "-o", tmp_path / "points.csv")
     assert shown.code == 0
     for sentence in found["sentences"]:
         assert sentence in shown.out
     assert "pendulums.0.damping" in shown.out
     assert len((tmp_path / "points.csv").read_text().splitlines()) == 11
-    assert json.loads(sprag("calibration", study_id, "--json").out) == found
-    assert sprag("calibration", study_id, "-o", tmp_path / "points.doc").code == 2
+    assert json.loads(sprag("show", study_id, "calibration", "--json").out) == found
+    assert sprag("show", study_id, "calibration", "-o", tmp_path / "points.doc").code == 2
 
 
 @pytest.mark.parametrize(("change", "code"), [("none", "required"), ("points", "unequal-lengths")])
@@ -57,6 +57,6 @@ def test_calibrate_names_what_is_wrong(sprag: Callable[..., Finished], tmp_path:
     if change == "none":
         del spec["calibrate"]
     (tmp_path / "spec.json").write_text(json.dumps(spec))
-    failed = sprag("calibrate", tmp_path / "spec.json", "--measured", points, "--json")
+    failed = sprag("show", tmp_path / "spec.json", "calibration", "--measured", points, "--json")
     assert failed.code == 2
     assert [problem["code"] for problem in json.loads(failed.err)["problems"]] == [code]

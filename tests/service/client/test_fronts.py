@@ -46,16 +46,16 @@ def test_the_command_shows_the_best_designs(
     connected(study_views)
     study_id = search(service)
     found = service.get(f"/studies/{study_id}/front")
-    shown = sprag("front", study_id, "--limit", 3, "-o", tmp_path / "front.csv")
+    shown = sprag("show", study_id, "front", "--limit", 3, "-o", tmp_path / "front.csv")
     assert shown.code == 0
     counts, designs = found["counts"], found["designs"]
     lines = shown.out.splitlines()
     assert lines[0].startswith(f"{counts['known']} designs, {counts['feasible']} feasible")
-    assert {"excitation.", "amplitude_x", "[rad/s]"} <= set(shown.out.split())
-    rows = [line.split() for line in lines[1:] if line.split()[:1] and line.split()[0].isdecimal()]
-    assert [[int(row[0]), int(row[-1])] for row in rows] == [[item["design"], item["rank"]] for item in designs[:3]]
+    assert {"excitation.amplitude_x", "[rad/s]"} <= set(shown.out.split())
+    rows = [line.split("\t") for line in lines[2:]]
+    assert [[int(row[0]), int(row[-2])] for row in rows] == [[item["design"], item["rank"]] for item in designs[:3]]
     with (tmp_path / "front.csv").open(newline="") as file:
         assert len(list(csv.DictReader(file))) == counts["known"]
-    told = json.loads(sprag("front", study_id, "--exact", "--json").out)
+    told = json.loads(sprag("show", study_id, "front", "--exact", "--json").out)
     assert told == service.get(f"/studies/{study_id}/front", exact=True, limit=20)
-    assert sprag("front", study_id, "-o", tmp_path / "front.doc").code == 2
+    assert sprag("show", study_id, "front", "-o", tmp_path / "front.doc").code == 2

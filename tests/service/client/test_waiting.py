@@ -10,7 +10,7 @@ from typing import Any
 import httpx
 import pytest
 
-from sprag_study.service.cli import remote
+from sprag_study.service.cli import following
 from sprag_study.service.client import (
     AsyncClient,
     Client,
@@ -174,7 +174,7 @@ def test_the_command_says_what_it_waits_for(
 ) -> None:
     held = study("paused", reason="the disk is full")
     client = served(Scripted([held, DOWN, DOWN, held, study("finished")], [[], []]))
-    assert remote.follow(client, STUDY)["state"] == "finished"
+    assert following.follow(client, STUDY)["state"] == "finished"
     assert capsys.readouterr().err.splitlines() == [
         f"{STUDY} is paused: the disk is full",
         "http://sprag: cannot connect - waiting for the service to answer again; the study is not lost.",
@@ -186,7 +186,7 @@ def test_the_demonstration_does_not_wait_for_a_service_that_it_started_itself(
     served: Callable[[Scripted], Client], sleeps: list[float]
 ) -> None:
     with pytest.raises(UnreachableError):
-        remote.follow(served(Scripted([study("running"), DOWN], [[]])), STUDY, patient=False)
+        following.follow(served(Scripted([study("running"), DOWN], [[]])), STUDY, patient=False)
 
 
 def test_a_timeout_that_is_no_number_is_refused_before_the_service_is_asked() -> None:

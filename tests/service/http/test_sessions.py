@@ -111,7 +111,7 @@ def test_whoever_has_a_token_is_told_why_it_lets_nobody_in(office: Office, monke
     assert expired.expires_at is not None
     time_of = expired.expires_at.strftime("%Y-%m-%dT%H:%M:%SZ")
     sentences = {
-        old: f"The token old ({expired.id}) expired at {time_of}; `sprag token create` creates another.",
+        old: f"The token old ({expired.id}) expired at {time_of}; `sprag admin token create` creates another.",
         office.read: f"The token manager ({office.reader.id}) was revoked.",
         of_dora: f"The token laptop ({dora.id}) belongs to the user dora, who was removed.",
         "sprag_" + "x" * 43: "This request carries no valid token.",

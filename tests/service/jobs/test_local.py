@@ -102,7 +102,7 @@ def test_a_run_without_room_for_its_rows_is_trouble_of_the_storage(
 
 
 def test_rows_that_find_no_room_are_trouble_of_the_storage(sprag: Callable[..., Finished], examples: Path) -> None:
-    done = sprag("trajectory", examples / "press.toml", "--points", "20000", "-o", "/dev/full")
+    done = sprag("show", examples / "press.toml", "trajectory", "--points", "20000", "-o", "/dev/full")
     assert (done.code, done.err) == (3, "sprag: /dev/full: no space left on device\n")
 
 

@@ -80,7 +80,7 @@ def test_the_command_runs_longer_what_the_button_does(
     timed = flagged(service, {"duration": "60 periods"})
     linked("extend")
     for study, at_most in ((study_id, 2000), (timed, 500)):
-        done = sprag("longer", study, "--at-most", at_most, "--json")
+        done = sprag("study", "longer", study, "--at-most", at_most, "--json")
         assert done.code == 0, done.err
         new = service.store.studies.study(done.data["id"])
         assert new.run.get("at_most", new.run.get("duration")) in (2000, [500.0, "periods"])

@@ -91,7 +91,7 @@ def test_the_command_shows_the_regime_of_every_point_of_a_curve(
     service: Service, study_id: str, linked: Linked, sprag: Any
 ) -> None:
     linked("study_views")
-    done = sprag("curve", study_id, "--x", "shaft.load", "--y", "shaft.speed.mean")
+    done = sprag("show", study_id, "curves", "--x", "shaft.load", "--y", "shaft.speed.mean")
     assert done.code == 0, done.err
     lines = [line.split() for line in done.out.splitlines()]
     head = next(place for place, line in enumerate(lines) if line[:1] == ["shaft.load"])
@@ -216,13 +216,13 @@ def test_clients_and_command_list_cases_by_ending_regime_and_flag(
             assert [case["case"] for case in found] == numbers
             assert portal.call(partial(listed, **kind)) == found
             options = [text for name, value in kind.items() for text in (f"--{name}", value)]
-            done = [sprag("cases", study_id, *options, *more) for more in (["--json"], [])]
+            done = [sprag("show", study_id, "cases", *options, *more) for more in (["--json"], [])]
             assert [ended.code for ended in done] == [0, 0], done[0].err
             assert done[0].data["cases"] == found
-    table = sprag("cases", study_id, "--regime", "periodic", "--result", "efficiency", "--limit", 1)
+    table = sprag("show", study_id, "cases", "--regime", "periodic", "--result", "efficiency", "--limit", 1)
     assert table.code == 0
     assert all(text in table.out for text in ("shaft.load", "regime", "periodic", "efficiency"))
-    assert "--result" in sprag("cases", study_id, "--result", "beauty").err
+    assert "--result" in sprag("show", study_id, "cases", "--result", "beauty").err
 
 
 def test_sensitivity_leaves_out_unsettled_cases_and_tells_of_regimes(service: Service, study_id: str) -> None:

@@ -177,7 +177,7 @@ def test_jumps_are_narrowed_over_http_by_clients_a_command_and_a_button(
     monkeypatch.setattr(
         "sprag_study.service.cli.extend.connection", lambda *_: Client("http://localhost", transport=transport)
     )
-    done = sprag("narrow", study_id, "--steps", 4, "--at", "shaft.load=0.1", "--at", "sweep=up", "--json")
+    done = sprag("study", "narrow", study_id, "--steps", 4, "--at", "shaft.load=0.1", "--at", "sweep=up", "--json")
     assert done.code == 0, done.err
     for one in map(service.store.studies.study, [*ids, done.data["id"]]):
         assert [axis.values for axis in one.axes] == [

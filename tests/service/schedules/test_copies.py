@@ -91,7 +91,7 @@ def by_cp(store: Store, target: Path) -> None:
 
 
 def by_backup(store: Store, target: Path) -> None:
-    assert execute(["db", "backup", str(target), "--db", str(store.session.path)]) == 0
+    assert execute(["admin", "db", "backup", str(target), "--db", str(store.session.path)]) == 0
 
 
 def by_move(store: Store, target: Path) -> None:
@@ -156,7 +156,7 @@ def test_a_copy_fires_nothing_until_it_is_adopted_and_the_original_goes_on(
     Reporter(original, delivery).look()
     assert len(hook.requests) == nights + 1
 
-    assert execute(["db", "adopt", "--db", str(target)]) == 0
+    assert execute(["admin", "db", "adopt", "--db", str(target)]) == 0
     (noted,) = copy.audit.rows(AuditFilter(action="database.adopt"))
     assert noted.door == "command"
     scheduler.look()
@@ -186,7 +186,7 @@ def assert_no_next_run(http: httpx.Client, capsys: pytest.CaptureFixture[str]) -
     metrics = http.get("/metrics").text
     assert "schedule_last_run_timestamp_seconds" in metrics
     assert "schedule_next_due_timestamp_seconds{" not in metrics
-    _show(shown, as_json=False)
+    _show(shown)
     told = capsys.readouterr().err
     assert "next run: none" in told
     assert OFF in told
@@ -357,7 +357,7 @@ def test_a_database_of_before_is_the_deployment_after_its_upgrade_without_a_word
         connection.exec_driver_sql("ALTER TABLE schedule_runs DROP COLUMN problem_values")
         connection.exec_driver_sql("UPDATE alembic_version SET version_num = '0036'")
     store.close()
-    assert execute(["db", "upgrade", "--no-backup", "--db", settings.database]) == 0
+    assert execute(["admin", "db", "upgrade", "--no-backup", "--db", settings.database]) == 0
     shutil.copy(settings.database, tmp_path / "copy.sqlite3")  # before it is started
     clock.set("2026-01-01T01:00")
     assert fire(opening(settings.database_url)) == 1

@@ -345,5 +345,5 @@ def test_a_night_of_unsettled_cases_ends_the_command_as_its_schedule_says(
     service.fill(service.store.studies.page().studies[0].id)
     Scheduler(service.store).look()
     code, out, _ = run("night")
-    assert code == 1
+    assert code == 4
     assert "The motions of 9 cases are unsettled" in " ".join(out.split())

@@ -133,7 +133,7 @@ def test_the_command_deletes_nothing_on_the_word_of_a_clock_that_jumped(
     assert execute(command) == ExitCode.TROUBLE
     assert "nothing is deleted by age until it is corrected" in capsys.readouterr().err
     assert store.studies.get(study).id == study
-    assert execute(["db", "clock", "--db", settings.database]) == 0
+    assert execute(["admin", "db", "clock", "--db", settings.database]) == 0
     assert execute(command) == 0
     with pytest.raises(StudyNotFoundError):
         store.studies.get(study)

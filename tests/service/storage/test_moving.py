@@ -153,8 +153,8 @@ def test_a_move_that_is_killed_before_it_begins_leaves_no_sound_empty_database(
         with pytest.raises(_PowerError):
             _move(source, target)
     report = maintenance.check(target)
-    assert any("run the same `sprag db move` again" in problem for problem in report.problems), report
-    with pytest.raises(SchemaError, match="run the same `sprag db move` again"):
+    assert any("run the same `sprag admin db move` again" in problem for problem in report.problems), report
+    with pytest.raises(SchemaError, match="run the same `sprag admin db move` again"):
         Store.open(urls[1])
     _move(source, target)
     assert _contents(target) == _contents(source)
@@ -180,7 +180,7 @@ def test_an_interrupted_move_is_continued_with_what_changed_meanwhile(
         patched.setattr(TableOf, "put", interrupted)
         with pytest.raises(_PowerError):
             _move(source, target)
-    with pytest.raises(SchemaError, match="run the same `sprag db move` again"):
+    with pytest.raises(SchemaError, match="run the same `sprag admin db move` again"):
         Store.open(urls[1])
     with source.write() as connection:
         connection.exec_driver_sql("UPDATE studies SET name = 'another' WHERE number = 2")
@@ -262,7 +262,7 @@ def test_a_mistyped_folder_of_the_target_is_named_and_not_created(
 ) -> None:
     Store.open(sqlite_url).close()
     target = tmp_path / "mistyped" / "a.sqlite3"
-    assert execute(["db", "move", str(target), "--db", sqlite_url]) == 2
+    assert execute(["admin", "db", "move", str(target), "--db", sqlite_url]) == 2
     assert f"{target}: there is no folder {target.parent}" in capsys.readouterr().err
     assert not target.parent.exists()
 
@@ -270,5 +270,5 @@ def test_a_mistyped_folder_of_the_target_is_named_and_not_created(
 def test_an_empty_target_is_refused(sqlite_url: str, capsys: pytest.CaptureFixture[str]) -> None:
     """As of a variable that is not set; it is not the user's own database."""
     Store.open(sqlite_url).close()
-    assert execute(["db", "move", "", "--db", sqlite_url]) == 2
+    assert execute(["admin", "db", "move", "", "--db", sqlite_url]) == 2
     assert "TARGET" in capsys.readouterr().err

@@ -325,15 +325,15 @@ def test_commands_about_the_database(
     postgres_server: postgres.Server, sprag: Callable[..., Finished], tmp_path: Path
 ) -> None:
     url = postgres_server.url(postgres_server.new_database())
-    made = sprag("db", "upgrade", "--db", url)
+    made = sprag("admin", "db", "upgrade", "--db", url)
     assert (made.code, f"from revision none to {HEAD_REVISION}" in made.out) == (0, True)
-    checked = sprag("db", "check", "--db", url)
+    checked = sprag("admin", "db", "check", "--db", url)
     assert (checked.code, checked.out.splitlines()[1]) == (0, "  sound")
     assert "PostgreSQL 1" in checked.out
-    refused = sprag("db", "backup", tmp_path / "copy", "--db", url)
+    refused = sprag("admin", "db", "backup", tmp_path / "copy", "--db", url)
     assert refused.code == 3
     assert "pg_dump" in refused.err
-    looked = sprag("doctor", "--db", url, "--json")
+    looked = sprag("admin", "doctor", "--db", url, "--json")
     subjects = {finding["subject"]: finding for finding in looked.data["findings"]}
     assert subjects["database"]["ok"]
     assert "SQLite" not in subjects

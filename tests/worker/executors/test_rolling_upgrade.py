@@ -61,7 +61,7 @@ class Upgrade:
         self.hosts[host] = self.cluster.workers[-1]
 
     def start_dispatcher(self, version: str) -> None:
-        """Start `sprag worker`, or restart it as another version."""
+        """Start `sprag admin worker`, or restart it as another version."""
         if self.dispatcher is not None:
             self.dispatcher.send_signal(signal.SIGTERM)
             assert self.dispatcher.wait(PATIENCE) == 0

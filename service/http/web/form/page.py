@@ -46,7 +46,7 @@ from sprag_study.service.http.web.form.machine_spec import base_of, values_of_ba
 from sprag_study.service.http.web.form.own_machine import own_spec
 from sprag_study.service.http.web.form.parts import count_of, parts_of, reshape, share, unshared
 from sprag_study.service.http.web.form.sent import changed_kinds, let_vary, settle
-from sprag_study.service.http.web.form.sheet import Sheet, preferred, sheet_of
+from sprag_study.service.http.web.form.sheet import Sheet, sheet_of
 from sprag_study.service.http.web.form.spec import (
     CONDITIONS,
     GOAL_DEFAULTS,
@@ -63,7 +63,7 @@ from sprag_study.service.http.work import Attended, Work
 from sprag_study.service.jobs.submission import Submission, take_in
 from sprag_study.service.presets import preset_names
 from sprag_study.service.reading.numbers import whole_number
-from sprag_study.service.reading.quantities import Units
+from sprag_study.service.reading.quantities import Units, preferred
 from sprag_study.service.reading.reader import Reading
 from sprag_study.service.reading.together import split_list
 from sprag_study.service.reading.units import QuantityError, parse_quantity

@@ -21,7 +21,7 @@ from sprag_study.service.languages import _, gettext
 from sprag_study.service.reading.cyrillic import latin
 from sprag_study.service.reading.numbers import parse_number
 from sprag_study.service.reading.part_names import lower_first
-from sprag_study.service.reading.quantities import SI, offered, read_units, workshop_units
+from sprag_study.service.reading.quantities import offered, preferred
 from sprag_study.service.reading.together import with_last_unit
 from sprag_study.service.reading.units import QuantityError, parse_quantity, plain_signs
 from sprag_study.service.reading.wording import number, unit_text
@@ -397,12 +397,6 @@ class _Making:
 def _alike(path: str) -> str:
     """What numbers have in common that can vary alike: those of both directions, or of several rows of a list."""
     return re.sub(r"\.\d+\.", ".*.", re.sub(r"_[xy]$", "", path))
-
-
-def preferred(choice: str, model: str) -> dict[str, str]:
-    """The unit in which plain numbers of each kind are shown, by SI unit; raises SelectionError as `read_units`."""
-    rest, chosen = read_units(choice)
-    return ({} if rest == SI else workshop_units(model)) | chosen
 
 
 def quantity_of(texts: Sequence[str], si: str, wanted_units: Mapping[str, str], *, listed: bool = False) -> Quantity:

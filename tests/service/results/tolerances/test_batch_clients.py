@@ -62,26 +62,26 @@ def test_the_commands_show_and_write_them(
     study_id = finish(service, {**SPEC, "drives": 128})
     own = f"/studies/{study_id}"
     file = tmp_path / "ribbon.csv"
-    shown = sprag("ribbon", study_id, "--y", "speed", "--quantile", "10%", "--quantile", 0.9, "-o", file)
+    shown = sprag("show", study_id, "ribbon", "--y", "speed", "--quantile", "10%", "--quantile", 0.9, "-o", file)
     assert shown.code == 0, shown.err
     found = service.get(f"{own}/ribbon", y="speed", quantile=[0.1, 0.9])
     assert {"nominal", "10", "90", "failed"} <= set(shown.out.split())
     with file.open(newline="") as opened:
         rows = [float(row["speed 10 %"]) for row in csv.DictReader(opened)]
     assert rows == found["lines"][0]["results"]["speed"]["values"][0]
-    assert sprag("ribbon", study_id, "--y", "speed", "--quantile", "10%", "-o", file, "--units", "mm").code == 0
+    assert sprag("show", study_id, "ribbon", "--y", "speed", "--quantile", "10%", "-o", file, "--units", "mm").code == 0
     with file.open(newline="") as opened:
         assert [float(row["speed 10 % [mm]"]) for row in csv.DictReader(opened)] == pytest.approx(
             [1e3 * v for v in rows]
         )
-    assert sprag("yield", study_id, CONDITION, "-o", file, "--units", "mm").code == 0
+    assert sprag("show", study_id, "yield", CONDITION, "-o", file, "--units", "mm").code == 0
     assert "load [mm]" in file.read_text().splitlines()[0]
-    assert json.loads(sprag("ribbon", study_id, "--y", "speed", "--json").out)["quantiles"] == [0.05, 0.5, 0.95]
-    shown = sprag("yield", study_id, CONDITION, "speed <= 70 m", "--worst", 2)
+    assert json.loads(sprag("show", study_id, "ribbon", "--y", "speed", "--json").out)["quantiles"] == [0.05, 0.5, 0.95]
+    shown = sprag("show", study_id, "yield", CONDITION, "speed <= 70 m", "--worst", 2)
     line = service.get(f"{own}/yield", condition=[CONDITION, "speed <= 70 m"])["lines"][0]
     assert f"at every place: {100 * line['all']['value']:.1f} %" in shown.err
     assert str(line["worst"][0]["drive"]) in shown.out.split()
     picture = tmp_path / "yield.svg"
-    assert sprag("yield", study_id, CONDITION, "-o", picture).code == 0
+    assert sprag("show", study_id, "yield", CONDITION, "-o", picture).code == 0
     assert picture.read_bytes().startswith(b"<?xml")
-    assert sprag("ribbon", study_id, "-o", tmp_path / "ribbon.doc").code == 2
+    assert sprag("show", study_id, "ribbon", "-o", tmp_path / "ribbon.doc").code == 2

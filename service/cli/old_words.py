@@ -1,0 +1,54 @@
+"""The names that commands had before version 1.0; for one release each is forwarded to its new name, with a line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import islice
+from typing import Final
+
+_VERBS: Final = (
+    "cancel", "delete", "edit", "extend", "longer", "narrow", "pause", "prioritize", "restore", "resume", "retry",
+    "select", "watch",
+)  # fmt: skip
+_VIEWS: Final = (
+    "answers", "basin", "branch", "calibration", "cases", "diagram", "engagements", "explore", "front", "map",
+    "regimes", "ribbon", "rounds", "section", "sensitivity", "strobes", "trajectory", "transient", "yield",
+)  # fmt: skip
+#: The new name by the old one; ID is the argument, which stands behind both.
+OLD: Final = {
+    "validate": "check",
+    "preview": "check",
+    "curve": "show ID curves",
+    "settle": "show ID settled",
+    "calibrate": "show ID calibration",
+    "case": "show ID case",
+    **{name: f"study {name}" for name in _VERBS},
+    **{name: f"show ID {name}" for name in _VIEWS},
+    **{name: f"admin {name}" for name in ("db", "doctor", "token", "user", "worker", "workers")},
+}
+
+
+def forwarded(words: Sequence[str]) -> tuple[list[str], str]:
+    """The words of today for those of a command line, and the new name where the old one was used, else ``""``."""
+    name, rest = (words[0], list(words[1:])) if words else ("", [])
+    if name not in OLD:
+        return list(words), ""
+    new = [word for word in OLD[name].split() if word != "ID"]
+    return ["show", *_of_case(rest)] if name == "case" else [*new, *rest], OLD[name]
+
+
+def _of_case(words: Sequence[str]) -> list[str]:
+    """``ID N [PART] --set NAME=VALUE`` of a case: its part is a view, its number and the settings are options."""
+    named: list[str] = []
+    options: list[str] = []
+    rest = iter(words)
+    for word in rest:
+        if word == "--set":
+            name, equals, value = next(rest, "").partition("=")
+            options.append(f"--{name.strip().replace('_', '-')}{equals}{value.strip()}")
+        elif word.startswith("-"):
+            options += [word, *(islice(rest, 1) if word in ("-o", "--output") else ())]
+        else:
+            named.append(word)
+    study, number, view = [*named, *[""] * 3][:3]
+    return [view or "case", *filter(None, [study]), *(["--case", number] if number else []), *options, *named[3:]]

@@ -1,0 +1,184 @@
+"""The words of the command line: how many there are, what their help costs, and the names that they had before."""
+
+from __future__ import annotations
+
+import json
+import os
+import stat
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+
+from sprag_study.service.cli import common, components, doctor
+from sprag_study.service.cli.app import command_line
+from sprag_study.service.cli.groups import common_first
+from sprag_study.service.cli.old_words import OLD, forwarded
+from sprag_study.service.storage.people.scopes import TokenScope
+from tests.conftest import Finished
+from tests.service.conftest import Service
+from tests.serving import served
+
+Sprag = Callable[..., Finished]
+
+
+def leaves(command: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Every command with its words."""
+    yield path, command
+    for name, inner in getattr(command, "commands", {}).items():
+        yield from leaves(inner, (*path, name))
+
+
+def test_there_are_twenty_words_and_few_options(sprag: Sprag) -> None:
+    assert len(command_line().commands) <= 20
+    assert len(sprag("--help").out.splitlines()) <= 45
+    assert len(sprag("--language", "uk", "--help").out.splitlines()) <= 45
+    visible = [
+        option
+        for _, command in leaves(command_line())
+        for option in command.params
+        if option.param_type_name == "option" and not option.hidden
+    ]
+    assert len(visible) <= 250
+
+
+def test_help_loads_no_command() -> None:
+    code = (
+        "import sys; from sprag_study.service.cli.app import execute; execute(['--help']); "
+        "print([name for name in sys.modules if name.startswith('sprag_study.service.cli.')])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = done.stdout.splitlines()[-1]
+    assert not [name for name in ("remote", "show", "study", "local", "admin") if f"cli.{name}'" in loaded], loaded
+
+
+@pytest.mark.parametrize("old", OLD)
+def test_every_old_name_is_forwarded_with_a_line_that_names_the_new_one(sprag: Sprag, old: str) -> None:
+    words, new = forwarded([old])
+    assert new == OLD[old]
+    tree: Any = command_line()
+    for word in words:
+        tree = tree.commands[word]
+    done = sprag(old, "--help")
+    assert done.out == sprag(*words, "--help").out
+    assert (done.code, done.err) == (0, f"`sprag {old}` is called `sprag {new}` from now on\n")
+    assert sprag(old, "--nonsense", "--json").err.startswith('{"error"'), "programs read one JSON object"
+    assert f"  {old} " not in sprag("--help").out
+
+
+def test_old_names_keep_their_arguments() -> None:
+    assert forwarded(["curve", "--x", "shaft.load", "st_1"])[0] == ["show", "curves", "--x", "shaft.load", "st_1"]
+    assert forwarded(["db", "upgrade"])[0] == ["admin", "db", "upgrade"]
+    assert forwarded(["case", "st_1", "4"])[0] == ["show", "case", "st_1", "--case", "4"]
+    assert forwarded(["case", "st_1", "4", "trajectory", "--set", "from=6 periods", "-o", "a.csv"])[0] == [
+        "show", "trajectory", "st_1", "--case", "4", "--from=6 periods", "-o", "a.csv",
+    ]  # fmt: skip
+    assert forwarded(["list", "curve"]) == (["list", "curve"], "")
+
+
+def test_common_options_stand_anywhere() -> None:
+    line = [
+        "--language",
+        "uk",
+        "show",
+        "st_1",
+        "--json",
+        "curves",
+        "--language",
+        "de",
+        "--server=http://a",
+        "--token",
+        "x",
+    ]
+    assert common_first(line) == (
+        ["--language", "uk", "--json", "--server=http://a", "--token", "x"],
+        ["show", "st_1", "curves", "--language", "de"],
+    )
+    assert common_first(["list", "--", "--json"]) == ([], ["list", "--", "--json"])
+
+
+def test_a_study_is_named_before_or_behind_the_view(sprag: Sprag, tmp_path: Path) -> None:
+    spec = tmp_path / "absent.json"
+    for words in (("show", spec, "curves"), ("show", "curves", spec), ("show", "curves", "--x", "a", spec)):
+        done = sprag(*words)
+        assert (done.code, f"{spec}: no such file" in done.err) == (2, True), words
+
+
+@pytest.fixture
+def login(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The file of the login, in a folder of the test's own."""
+    for name in ("SPRAG_SERVER", "SPRAG_TOKEN"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(typer, "get_app_dir", lambda name: str(tmp_path / "settings" / name))
+    return common.profile_file()
+
+
+def test_a_login_keeps_address_and_token_for_its_service_only(
+    sprag: Sprag, service: Service, login: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    secret, _ = service.store.people.create_token("laptop", TokenScope.WRITE)
+    study = None
+    with served(service.app) as address:
+        assert sprag("login", address, "--token", "wrong").code == 3
+        assert not login.exists(), "what the service refuses is not kept"
+        assert sprag("login", address, "--token", secret).code == 0
+        assert json.loads(login.read_text()) == {"server": address, "token": secret}
+        if os.name == "posix":
+            assert stat.S_IMODE(login.stat().st_mode) == 0o600
+        study = sprag("list", "--json")
+        assert study.code == 0, study.err
+        monkeypatch.setenv("SPRAG_SERVER", "http://elsewhere.example")
+        assert common.address() == ("http://elsewhere.example", None), "a token is sent to no other service"
+        monkeypatch.delenv("SPRAG_SERVER")
+        assert sprag("logout").code == 0
+        assert not login.exists()
+        assert sprag("list").code == 3
+    assert "there is no login" in sprag("logout").err
+
+
+def test_a_fault_of_the_program_has_an_exit_code_of_its_own(
+    sprag: Sprag, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from sprag_study.service.cli import app
+
+    def wrong() -> None:
+        raise RuntimeError
+
+    monkeypatch.setattr("sprag_study.service.cli.settings.read_settings", wrong)
+    assert app.execute(["settings"]) == 1
+    assert "This is a bug in Sprag" in capsys.readouterr().err
+
+
+def test_findings_are_printed_as_they_come(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    printed = []
+
+    def examine(_db: str | None) -> Iterator[doctor.Finding]:
+        yield doctor.Finding("first", True, "fine")
+        printed.append(capsys.readouterr().out)
+        yield doctor.Finding("second", True, "fine too")
+
+    monkeypatch.setattr(doctor, "examine", examine)
+    doctor.doctor()
+    assert printed == ["   ok  first: fine\n"]
+
+
+def test_components_are_listed_with_their_units(
+    sprag: Sprag, service: Service, connected: Callable[[Any], None]
+) -> None:
+    connected(components)
+    fields = {"coefficients": "0; 200", "backlash": "0.3 deg", "windup_limit": "0.1"}
+    body = {"components": [{"kind": "clutch", "name": "FW 20", "fields": fields}]}
+    assert service.http.post("/api/v1/components", json=body).status_code in (200, 201)
+    shown = sprag("component", "list").out
+    assert "windup_limit 0.1 rad" in shown
+    assert "backlash 0.3°" in shown or "backlash 0.3 deg" in shown
+
+
+def test_a_damaged_login_is_none(login: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    login.parent.mkdir(parents=True)
+    login.write_text("not JSON")
+    assert common.address() == (common.DEFAULT_SERVER, None)
