@@ -9,9 +9,8 @@ import numpy as np
 
 from sprag_study.sentences import Amount
 from sprag_study.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
-from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.figures.sections import parameter_of
 from sprag_study.service.reading.reader import Phrase, joined, plural, term
-from sprag_study.service.results.selection import axis_name
 
 if TYPE_CHECKING:
     from sprag_study.worker.arrays import Bools, Floats, Ints
@@ -38,9 +37,7 @@ class OwnCases:
 
 def branch_figure(made: CaseBranch, study: Study, along: Along, result: str, own: OwnCases | None = None) -> Figure:
     """One result over the parameter, with the study's own cases beside it."""
-    path = along.paths[0]
-    name = axis_name(study, path) if study.axis_of(path) is not None else " = ".join(along.paths)
-    x = Quantity(name, unit_of(study, path))
+    x = parameter_of(study, along.paths)
     column = made.names.index(result)
     y = Quantity(result, made.units[column])
     if not made.order:

@@ -57,13 +57,13 @@ def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1, *, apar
     labels = [label for label, _ in drawn]
     panels = []
     for index, info in enumerate(chosen.results):
-        y, infos = Quantity(info.name, info.unit), (info,)
         parts = (
-            *_lines(lines, labels, infos, chosen.units, listed=index == 0),
-            *_further(drawn, infos, listed=index == 0),
+            *_lines(lines, labels, info, chosen.units, listed=index == 0),
+            *_further(drawn, info, listed=index == 0),
         )
-        bands = tuple(_bands(lines, infos)) if len(drawn) == 1 else ()
-        panels.append(Panel(y, parts, tuple(_marks(lines, infos, regimes)), bands=bands))
+        bands = tuple(_bands(lines, info)) if len(drawn) == 1 else ()
+        marks = tuple(_marks(lines, info, regimes))
+        panels.append(Panel(Quantity(info.name, info.unit), parts, marks, bands=bands))
     most = min(max(_MOST_POINTS // len(lines), _LEAST_POINTS), _LINE_POINTS)
     spans, looks = strip_of(drawn[0][1].curves, chosen.units) if len(drawn) == 1 else ({}, {})
     return Figure(
@@ -91,13 +91,13 @@ def _remark(curves: Curves) -> str:
     return "" if plan is None else sentence(plan, refined, (info.name for info in curves.selection.results))
 
 
-def _bands(lines: Sequence[tuple[int, Curve]], infos: Sequence[ResultInfo]) -> Iterator[Band]:
+def _bands(lines: Sequence[tuple[int, Curve]], info: ResultInfo) -> Iterator[Band]:
     """The jumps of refined curves and of sweeps."""
     for index, ((_, curve), colour) in enumerate(zip(lines, _colours(lines), strict=True)):
         for jump in curve.jumps or ():
             yield Band(jump["low"], jump["high"], colour, str(index))
         if curve.refined is not None:
-            for jump in jumps_of(curve.refined, (info.name for info in infos)):
+            for jump in jumps_of(curve.refined, (info.name,)):
                 yield Band(jump["low"], jump["high"], colour, str(index))
 
 
@@ -118,7 +118,7 @@ def _colours(lines: Sequence[tuple[int, Curve]]) -> list[str]:
 def _lines(
     lines: Sequence[tuple[int, Curve]],
     labels: Sequence[str],
-    infos: Sequence[ResultInfo],
+    info: ResultInfo,
     units: Mapping[str, str],
     *,
     listed: bool,
@@ -129,24 +129,23 @@ def _lines(
         run = curve.run()
         x = np.asarray(curve.line.x)[run]
         values = values_text(curve.line.by, units)
-        for place, info in enumerate(infos):
-            yield Line(
-                values or labels[study],
-                x,
-                curve.shown(info.name)[run],
-                colour,
-                style=down if both else study,
-                key=str(index),
-                heading=labels[study] if values else "",
-                listed=listed and place == 0,
-                cases=curve.line.cases[run],
-                stretches=joined_points(curve, info.name),
-                # A line needs y as a function of x; the points of a zip may go back and forth.
-                joined=bool(np.all(np.diff(x) > 0.0)),
-            )
+        yield Line(
+            values or labels[study],
+            x,
+            curve.shown(info.name)[run],
+            colour,
+            style=down if both else study,
+            key=str(index),
+            heading=labels[study] if values else "",
+            listed=listed,
+            cases=curve.line.cases[run],
+            stretches=joined_points(curve, info.name),
+            # A line needs y as a function of x; the points of a zip may go back and forth.
+            joined=bool(np.all(np.diff(x) > 0.0)),
+        )
 
 
-def _further(drawn: Sequence[tuple[str, Curves]], infos: Sequence[ResultInfo], *, listed: bool) -> Iterator[Line]:
+def _further(drawn: Sequence[tuple[str, Curves]], info: ResultInfo, *, listed: bool) -> Iterator[Line]:
     """The other motions of cases that have several, as points in the colour of their curve."""
     curves = drawn[0][1] if len(drawn) == 1 else None
     if curves is None or not curves.further:
@@ -155,37 +154,34 @@ def _further(drawn: Sequence[tuple[str, Curves]], infos: Sequence[ResultInfo], *
     colours = line_colours(len(own))
     for count, curve in enumerate(curves.further):
         index = own.index(curve.line.by)
-        for place, info in enumerate(infos):
-            values = curve.shown(info.name)
-            kept = np.isfinite(values)
-            yield Line(
-                OTHER_MOTIONS,
-                np.asarray(curve.line.x)[kept],
-                values[kept],
-                colours[index],
-                style=place,
-                key=str(index),
-                listed=listed and count == place == 0,
-                cases=curve.line.cases[kept],
-                joined=False,
-            )
+        values = curve.shown(info.name)
+        kept = np.isfinite(values)
+        yield Line(
+            OTHER_MOTIONS,
+            np.asarray(curve.line.x)[kept],
+            values[kept],
+            colours[index],
+            key=str(index),
+            listed=listed and not count,
+            cases=curve.line.cases[kept],
+            joined=False,
+        )
 
 
-def _marks(lines: Sequence[tuple[int, Curve]], infos: Sequence[ResultInfo], regimes: Sequence[str]) -> Iterator[Marks]:
+def _marks(lines: Sequence[tuple[int, Curve]], info: ResultInfo, regimes: Sequence[str]) -> Iterator[Marks]:
     """The points of each regime that occurs, except periodic ones, which have the colour of their curve."""
     for name in regimes:
         places = [
-            (curve, place, info.name)
+            (curve, place)
             for _, curve in lines
-            for place, own in enumerate(_regimes(curve))
-            if own == name and name in MARKED
-            for info in infos
+            for place, regime in enumerate(_regimes(curve))
+            if regime == name and name in MARKED
         ]
         yield Marks(
             name,
-            np.array([curve.line.x[place] for curve, place, _ in places]),
-            np.array([curve.y[result][place] for curve, place, result in places]),
-            np.array([curve.line.cases[place] for curve, place, _ in places], dtype=np.int64),
+            np.array([curve.line.x[place] for curve, place in places]),
+            np.array([curve.y[info.name][place] for curve, place in places]),
+            np.array([curve.line.cases[place] for curve, place in places], dtype=np.int64),
         )
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag_study.service.figures.figure import NEUTRAL, PALETTE, Figure, Line, Panel, Quantity, colour_at
+from sprag_study.service.figures.orders import runs_of
 from sprag_study.service.reading.reader import Phrase, joined, part_label
 from sprag_study.service.reading.wording import words
 
@@ -97,11 +98,8 @@ def _held_lines(name: str, made: Trajectory, panel: Described, shown: Presentati
 
 def _spans(made: Trajectory, states: list[str]) -> Iterator[tuple[str, float, float]]:
     """Runs of equal states, each until the next begins."""
-    start = 0
-    for position in range(1, len(states) + 1):
-        if position == len(states) or states[position] != states[start]:
-            yield states[start], float(made.times[start]), float(made.times[min(position, made.times.size - 1)])
-            start = position
+    for state, start, stop in runs_of(states):
+        yield state, float(made.times[start]), float(made.times[min(stop, made.times.size - 1)])
 
 
 def phase_figure(made: Trajectory, shown: Presentation) -> Figure:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain
-from typing import TYPE_CHECKING, Final
+from itertools import chain, groupby
+from typing import TYPE_CHECKING, Final, TypeVar
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from sprag_study.service.results.sweeps import values_text
 if TYPE_CHECKING:
     from sprag_study.service.results.curves import Curve, Map
     from sprag_study.worker.arrays import Floats
+
+Name = TypeVar("Name")
 
 Look = tuple[str, str]
 Span = tuple[str, float, float]
@@ -112,18 +114,21 @@ def strip_of(curves: Sequence[Curve], units: Mapping[str, str]) -> tuple[dict[st
         if curve.regimes is None or curve.orders is None or len(curves) > MOST_ROWS or np.any(np.diff(x) <= 0.0):
             return {}, {}
         names = [motion_name(curve.regimes[place], curve.orders[place]) for place in run.tolist()]
-        rows[values_text(curve.line.by, units)] = tuple(_spans(names, edges(x) if x.size else x))
+        borders = edges(x).tolist() if x.size else []
+        rows[values_text(curve.line.by, units)] = tuple(
+            (name, borders[start], borders[stop]) for name, start, stop in runs_of(names) if name is not None
+        )
     looks = looks_of(name for spans in rows.values() for name, _, _ in spans)
     return (rows, looks) if set(looks) - {"1 period"} else ({}, {})
 
 
-def _spans(names: Sequence[str | None], borders: Floats) -> Iterator[Span]:
+def runs_of(names: Iterable[Name]) -> Iterator[tuple[Name, int, int]]:
+    """Each run of equal names, with its first place and the first one behind it."""
     start = 0
-    for place in range(1, len(names) + 1):
-        if place == len(names) or names[place] != names[start]:
-            if (name := names[start]) is not None:
-                yield name, float(borders[start]), float(borders[place])
-            start = place
+    for name, run in groupby(names):
+        stop = start + len(list(run))
+        yield name, start, stop
+        start = stop
 
 
 @dataclass(frozen=True, slots=True)

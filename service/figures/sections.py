@@ -16,7 +16,7 @@ from sprag_study.service.results.selection import axis_name
 from sprag_study.worker import models
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from sprag_study.worker.models.sections import CaseSections, Sampling
     from sprag_study.worker.study import Study
@@ -29,9 +29,7 @@ _OTHERS = Phrase("irregular or unsettled: last strobes")
 
 def diagram_figure(made: CaseSections, study: Study, asked: Sampling, variable: str) -> Figure:
     """One variable at the strobes over the parameter."""
-    path = asked.paths[0]
-    name = axis_name(study, path) if study.axis_of(path) is not None else " = ".join(asked.paths)
-    x, column = Quantity(name, unit_of(study, path)), made.names.index(variable)
+    x, column = parameter_of(study, asked.paths), made.names.index(variable)
     values = made.values[:, :, column]
     lines: list[Line] = []
     for label, colour, wanted in (
@@ -47,6 +45,12 @@ def diagram_figure(made: CaseSections, study: Study, asked: Sampling, variable: 
     )
     note = "" if lines else Phrase("There are no strobes: no case ended ok.")
     return Figure(x, (panel,), heading=_heading(asked), most=_MOST, note=note)
+
+
+def parameter_of(study: Study, paths: Sequence[str]) -> Quantity:
+    """The quantity of tied parameters, named as their axis where they vary in the study."""
+    name = " = ".join(paths) if study.axis_of(paths[0]) is None else axis_name(study, paths[0])
+    return Quantity(name, unit_of(study, paths[0]))
 
 
 def section_figure(made: CaseSections, study: Study, asked: Sampling) -> Figure:
