@@ -11,6 +11,7 @@ from sprag_study.service.cli.file_formats import TableFormat, TableFormOption, r
 from sprag_study.service.cli.files import to_file, write_pieces
 from sprag_study.service.cli.names import study_of
 from sprag_study.service.cli.options import (
+    CsvDecimal,
     CsvHeader,
     FileUnits,
     OutputFile,
@@ -26,7 +27,7 @@ from sprag_study.service.views.setting import settings_of
 from sprag_study.service.views.study_questions import ReportQuestion
 
 if TYPE_CHECKING:
-    from sprag_study.service.formats import Header
+    from sprag_study.service.formats import Decimal, Header
 
 #: What a report says; the curves of its figures are chosen by saved views.
 _ASKED: Final = tuple(
@@ -36,17 +37,18 @@ _ASKED: Final = tuple(
 
 def _export(
     study_id: str, form: TableFormat | None, file: str | None, units: str | None, header: Header | None,
-    language: str | None, **asked: Any,
+    decimal: Decimal | None, language: str | None, **asked: Any,
 ) -> None:  # fmt: skip
     from sprag_study.service.client.wire import study_path
 
     chosen = table_format(form, file)
-    require_csv(header, chosen)
+    require_csv(header, decimal, chosen)
     given = [*query_of(_ASKED, asked), *in_language(language)]
     table = chosen in get_args(Format)
     if table and given:
         raise wrong_option(f"--{given[0][0]}", "not-used", N_("only reports have it"), given[0][1], allowed="pdf, html")
-    query = [*in_units(units), *given, *([] if header is None else [("header", header)])]
+    settings_given = [(name, value) for name, value in (("header", header), ("decimal", decimal)) if value is not None]
+    query = [*in_units(units), *given, *settings_given]
     with connection() as client:
         path = study_path(study_of(client, study_id))
         report = f"{path}/report", [*query, ("format", chosen)]
@@ -66,7 +68,7 @@ export: Final = signed(
     [
         parameter("study_id", StudyId, ...), parameter("form", TableFormOption, None),
         parameter("file", OutputFile, None), parameter("units", FileUnits, None), parameter("header", CsvHeader, None),
-        parameter("language", PictureLanguage, None),
+        parameter("decimal", CsvDecimal, None), parameter("language", PictureLanguage, None),
         *(parameter(one.name, option(one), one.default) for one in _ASKED),
     ],
 )  # fmt: skip

@@ -12,7 +12,7 @@ from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import WrongInputError, wrong_option
 from sprag_study.service.cli.files import to_file
 from sprag_study.service.cli.options import ValueFormat
-from sprag_study.service.formats import REPORT_FORMATS, SUFFIXES, Format, Header, ReportFormat, format_of
+from sprag_study.service.formats import REPORT_FORMATS, SUFFIXES, Decimal, Format, Header, ReportFormat, format_of
 from sprag_study.service.languages import N_, _
 
 #: Formats of a whole study: case rows (`sprag_study.service.exports`) and documents (`sprag_study.service.report`).
@@ -51,10 +51,11 @@ def value_format(form: ValueFormat | None, file: str | None, pictures: Sequence[
     return "json" if (wants_json() if form is None else form is ValueFormat.JSON) else "csv"
 
 
-def require_csv(header: Header | None, form: str) -> None:
-    """Raise WrongInputError for ``--header`` where the file is not CSV."""
-    if header is not None and form != "csv":
-        raise wrong_option("--header", "not-used", N_("only CSV files have it"), header, allowed="csv")
+def require_csv(header: Header | None, decimal: Decimal | None, form: str) -> None:
+    """Raise WrongInputError for ``--header`` or ``--decimal`` where the file is not CSV."""
+    for option, value in (("--header", header), ("--decimal", decimal)):
+        if value is not None and form != "csv":
+            raise wrong_option(option, "not-used", N_("only CSV files have it"), value, allowed="csv")
 
 
 def require_report(appendix: Sequence[str] | None, form: str) -> None:

@@ -34,6 +34,7 @@ from sprag_study.service.cli.files import output, read_study, to_file
 from sprag_study.service.cli.options import (
     Appendix,
     ChunkCases,
+    CsvDecimal,
     CsvHeader,
     FinishBy,
     Fresh,
@@ -182,6 +183,7 @@ def run(
     file: OutputFile = None,
     form: TableFormOption = None,
     header: CsvHeader = None,
+    decimal: CsvDecimal = None,
     appendix: Appendix = None,
     db: KeptIn = None,
     processes: Processes = None,
@@ -190,10 +192,11 @@ def run(
     finish_by: FinishBy = None,
 ) -> None:
     """Run a study here, without a service: rows or a report to standard output or FILE, progress on standard error."""
+    from sprag_study.service.exports.decimal_commas import with_commas
     from sprag_study.service.results.unaffected import unaffecting
 
     finish, written = _finish(finish_by), table_format(form, file)
-    require_csv(header, written)
+    require_csv(header, decimal, written)
     require_report(appendix, written)
     settings = read_settings(database=db, processes=processes, chunk_cases=chunk)
     parsed = read_study(spec, points, partial(_with_start, settings) if db is not None else None, tables)
@@ -212,7 +215,8 @@ def run(
             finish_by=finish,
         ) as done,
     ):
-        for piece in _rows(done, written, header or "names", appendix):
+        pieces = _rows(done, written, header or "names", appendix)
+        for piece in with_commas(pieces) if decimal == "comma" else pieces:
             write(piece)
         record, without_effect = done.record, unaffecting(done.store, done.record)
         progress = done.store.studies.progress(record.id)

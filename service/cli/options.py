@@ -9,7 +9,7 @@ from typing import Annotated, Any, Final
 import typer
 
 from sprag_study.service.cli import completion
-from sprag_study.service.formats import Header
+from sprag_study.service.formats import Decimal, Header
 from sprag_study.service.views.study_questions import CHAPTERS
 from sprag_study.worker.limits import MAX_STARTS
 
@@ -57,6 +57,12 @@ CsvHeader = Annotated[
     Header | None,
     typer.Option(
         "--header", help="Heads of CSV columns: names, with units that are not SI, or every unit; default: names."
+    ),
+]
+CsvDecimal = Annotated[
+    Decimal | None,
+    typer.Option(
+        "--decimal", help="Decimal sign of CSV; a comma goes with semicolons and a byte order mark; default: point."
     ),
 ]
 Appendix = Annotated[

@@ -255,10 +255,14 @@ def test_a_file_has_the_header_that_is_asked_for(
     done = sprag("export", "latest", "--header", "units")
     assert done.code == 0
     assert "shaft.load [N*m]" in done.out.partition("\n")[0].split(",")
+    commas = sprag("export", "latest", "--decimal", "comma")
+    assert commas.code == 0
+    assert commas.out.startswith("\ufeffcase;")
     for command in (["export", "latest"], ["run", examples / "one_pendulum.json"]):
-        refused = sprag(*command, "-o", tmp_path / "rows.xlsx", "--header", "units", "--json")
-        (problem,) = refused.failure["problems"]
-        assert (refused.code, problem["code"], problem["allowed"]) == (2, "not-used", "csv")
+        for option in (["--header", "units"], ["--decimal", "comma"]):
+            refused = sprag(*command, "-o", tmp_path / "rows.xlsx", *option, "--json")
+            (problem,) = refused.failure["problems"]
+            assert (refused.code, problem["code"], problem["allowed"]) == (2, "not-used", "csv")
     assert list(tmp_path.glob("rows*")) == []
 
 
