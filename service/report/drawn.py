@@ -26,9 +26,10 @@ if TYPE_CHECKING:
 def image(report: Report, figure: Figure, caption: str) -> Image:
     """A described figure in the reader's units, the curve that is meant in ink."""
     read = read_figure(figure, report.reading)
-    head = ["; ".join(read.held)] if read.held and read.studies == 1 else []
+    if read.held and read.studies == 1:  # in the text, which has room for it on a phone too
+        caption = f"{caption}. {'; '.join(read.held)}"
     chosen = "" if report.curve is None else str(report.curve)
-    drawn = svg(read, width=WIDE if read.columns == 1 else DOUBLE, label=caption, chosen=chosen, head=head, below=True)
+    drawn = svg(read, width=WIDE if read.columns == 1 else DOUBLE, label=caption, chosen=chosen, below=True)
     return Image(as_file(drawn).encode(), caption, caption)
 
 

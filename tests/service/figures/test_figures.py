@@ -8,10 +8,11 @@ import numpy as np
 
 from sprag_study.service import languages
 from sprag_study.service.figures.curves import curves_figure
-from sprag_study.service.figures.figure import PALETTE
+from sprag_study.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
 from sprag_study.service.figures.motion import motion_figure, phase_figure
 from sprag_study.service.figures.portrait import portrait_figure
 from sprag_study.service.figures.svg import svg
+from sprag_study.service.http.web.comparison.answer import without_empty
 from sprag_study.service.reading.reader import shown as shown_text
 from sprag_study.service.results.curve_cases import draw, select
 from sprag_study.service.results.curves import CurveQuery
@@ -63,3 +64,11 @@ def test_a_motion_is_drawn_over_its_states_and_as_a_portrait() -> None:
         assert {shown_text(line.name) for line in portrait.panels[0].lines} >= {"Маятник 0"}
         assert {shown_text(line.name) for line in portrait.panels[1].lines} >= {"Вал"}
     assert (orbit.x.tolist(), orbit.y.tolist(), orbit.colour) == ([0.0, 8.0, 16.0], [1.0, 9.0, 17.0], PALETTE[0])
+
+
+def test_a_comparison_has_no_empty_chart() -> None:
+    x = np.array([0.0, 1.0])
+    full, empty = (Panel(Quantity(name, "1"), (Line("", x, values, PALETTE[0]),))
+                   for name, values in (("full", x), ("empty", np.full(2, np.nan))))  # fmt: skip
+    assert without_empty(Figure(Quantity("x", "1"), (empty, full))).panels == (full,)
+    assert without_empty(Figure(Quantity("x", "1"), (empty,))).panels == (empty,)

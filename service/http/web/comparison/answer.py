@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
+import numpy as np
 from markupsafe import Markup
 from starlette.datastructures import QueryParams
 
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from sprag_study.service.faults import Fault
+    from sprag_study.service.figures.figure import Figure
     from sprag_study.service.reading.reader import Choice, Reading
     from sprag_study.service.results.curves import Curve, CurveQuery, Curves
     from sprag_study.service.storage.studies.records import StudyRecord
@@ -128,8 +130,17 @@ def answer_of(library: Library, given: Sequence[tuple[str, str]], choice: Choice
         return answer(faults=error.faults)
     kept, left = charted(chosen, curves)
     title = _title(chosen, reading)
-    figure = drawn_figure(read_figure(curves_figure(kept, 2, apart=told_apart_by(studies)), reading), title)
+    described = curves_figure(kept, 2, apart=told_apart_by(studies))
+    if not params.get("y"):
+        described = without_empty(described)
+    figure = drawn_figure(read_figure(described, reading), title)
     return answer(figure, title, _left(left, reading), _held(chosen.held(), names, reading))
+
+
+def without_empty(figure: Figure) -> Figure:
+    """The figure without panels whose lines have no number; as it is where none has one."""
+    panels = tuple(each for each in figure.panels if any(np.isfinite(line.y).any() for line in each.lines))
+    return replace(figure, panels=panels or figure.panels)
 
 
 def _held(held: Sequence[tuple[str, ...]], names: Sequence[str], reading: Reading) -> list[tuple[str, str]]:
