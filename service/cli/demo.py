@@ -140,7 +140,7 @@ def _show_curve(curves: dict[str, Any]) -> None:
         "#" * round(_BAR * speed / top) if ending == OK else ending
         for speed, ending in zip(speeds, drawn["endings"], strict=True)
     ]
-    held = ", ".join(f"{path} {value}" for path, value in _HELD)
+    held = ",\n".join(f"{path} {value}" for path, value in _HELD)
     headings = [(_("load\n[N*m]"), True), *((_(heading), True) for _name, heading in _TABLE), (_("mean speed"), False)]
     rows = list(zip(drawn["x"], *columns, bars, strict=True))
     show_table(_("Mechanical characteristic at {place}", place=held), headings, rows)

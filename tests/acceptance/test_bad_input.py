@@ -65,7 +65,7 @@ def test_wrong_questions_through_the_commands(running: Service, tmp_path: Path, 
     at = ("--server", running.address)
     study = sprag("submit", EXAMPLES / "measured_clutch.json", "--wait", "--json", *at).data["id"]
     wrong = [
-        (("watch", "st_nothing"), "no study"),
+        (("study", "watch", "st_nothing"), "no study"),
         (("cancel", "../../etc/passwd"), ""),
         (("cancel", study), "finished"),
         (("curve", study, "--x", "shaft.lode", "--y", "torque.max"), "shaft.load"),

@@ -97,7 +97,7 @@ def test_nobody_at_the_address_is_said_in_one_sentence(sprag: Sprag) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))  # bound but not listening: nobody answers, and nobody else can begin to
         address = f"http://127.0.0.1:{taken.getsockname()[1]}"
-        for arguments in (("list",), ("watch", "st_1"), ("submit", SMALL)):
+        for arguments in (("list",), ("study", "watch", "st_1"), ("submit", SMALL)):
             done = sprag(*arguments, "--server", address)
             assert done.code == 3
             assert done.err.count("\n") == 1
@@ -169,7 +169,7 @@ def test_a_worker_alone_runs_what_a_service_was_given(tmp_path: Path, sprag: Spr
     database = tmp_path / "study.sqlite3"
     assert sprag("admin", "db", "upgrade", "--db", database).code == 0
     worker = subprocess.Popen(
-        [*COMMAND, "worker", "--db", str(database), "--processes", "1"], stderr=subprocess.PIPE, env=environment()
+        [*COMMAND, "admin", "worker", "--db", str(database), "--processes", "1"], stderr=subprocess.PIPE, env=environment()
     )
     assert worker.stderr is not None
     with worker, worker.stderr as said:
@@ -206,7 +206,7 @@ SERVE = "serve --json --port 0 --db x.sqlite3"
 #: Commands that write with each of the ways to write: tables, plain text, JSON, click's help, a service; and each way
 #: to have no reader.
 WITHOUT_READER = [
-    *product(("presets", "token", "presets --json", "run --help"), (">&-", ">&- <&-", "| true")),
+    *product(("presets", "admin token", "presets --json", "run --help"), (">&-", ">&- <&-", "| true")),
     (SERVE, ">&- <&-"),
 ]
 
@@ -224,7 +224,7 @@ def test_a_closed_standard_output_ends_quietly(tmp_path: Path, command: str, red
 
 def test_files_do_not_get_the_number_of_a_closed_stream(tmp_path: Path) -> None:
     """What is said would otherwise be written into the database."""
-    command = [*COMMAND, "validate", str(tmp_path / "none.json")]
+    command = [*COMMAND, "check", str(tmp_path / "none.json")]
     for redirection in ("2>&-", "<&- >&- 2>&-"):
         done = subprocess.run(
             ["sh", "-c", f'"$@" {redirection}', "sh", *command],
@@ -268,7 +268,7 @@ def test_an_interrupt_of_a_command_that_follows_names_the_study_that_goes_on(
     long.write_text(json.dumps(spec))
     if command == "watch":
         study = sprag("submit", long, *at).out.strip()
-        arguments = ["watch", study, *at]
+        arguments = ["study", "watch", study, *at]
     else:
         study, arguments = "", ["submit", str(long), "--wait", "--key", str(tmp_path), *at]
     with subprocess.Popen([*INTERRUPTIBLE, *arguments], stderr=subprocess.PIPE, env=environment()) as process:

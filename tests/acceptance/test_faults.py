@@ -70,7 +70,7 @@ def signals() -> Iterator[None]:
         signal.signal(number, handler)
 
 
-@pytest.mark.parametrize("command", ["serve", "worker"])
+@pytest.mark.parametrize("command", ["serve", "admin worker"])
 @pytest.mark.parametrize(
     ("spoil", "message", "remedy"),
     [
@@ -88,7 +88,7 @@ def test_a_database_that_cannot_be_trusted_is_refused_at_the_start(
     assert sprag("admin", "db", "upgrade", "--db", database).code == 0
     spoil(database)  # type: ignore[operator]
     before = database.read_bytes()
-    refused = sprag(command, "--db", database, *(["--port", "0"] if command == "serve" else []))
+    refused = sprag(*command.split(), "--db", database, *(["--port", "0"] if command == "serve" else []))
     assert refused.code == 3
     assert message in refused.err
     assert remedy in refused.err
