@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Final, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from sprag_study.service import languages
 from sprag_study.service.client.errors import RefusedError
@@ -18,7 +18,7 @@ from sprag_study.service.exports.decimal_commas import with_commas
 from sprag_study.service.faults import FaultError, choice_of, parameter_error
 from sprag_study.service.figures.pictures import PICTURES
 from sprag_study.service.formats import DECIMALS, FORMATS, HEADERS
-from sprag_study.service.http.problems import PROBLEM_TYPES, problem_json
+from sprag_study.service.http.problems import as_api_error, problem_json
 from sprag_study.service.http.views import case_detail, whole_detail
 from sprag_study.service.jobs import checks
 from sprag_study.service.jobs.submission import accept
@@ -55,7 +55,6 @@ from sprag_study.worker.states import TransitionError
 
 if TYPE_CHECKING:
     from sprag_study.service.client.wire import Query
-    from sprag_study.service.faults import Kind
     from sprag_study.service.settings import Settings
     from sprag_study.service.spec.document import ParsedSpec
     from sprag_study.service.storage.store import Store
@@ -225,7 +224,7 @@ def _refusing() -> Iterator[None]:
     try:
         yield
     except (FaultError, StoreError, TransitionError) as error:
-        faults: Sequence[Any] = getattr(error, "faults", ())
-        kind = PROBLEM_TYPES.get(cast("Kind", error.code), PROBLEM_TYPES["unavailable"])
-        document = problem_json(kind, getattr(error, "detail", str(error)), faults)
-        raise RefusedError(kind.status, document) from error
+        problem = as_api_error(error)
+        assert problem is not None
+        document = problem_json(problem.type, problem.detail, problem.faults)
+        raise RefusedError(problem.type.status, document) from error

@@ -13,40 +13,20 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
 
-from sprag_study.sentences import Sentence, Whole, joined, whole
-from sprag_study.service.faults import FaultError, Kind, parameter_error, shown
-from sprag_study.service.http.problems import PROBLEM_TYPES, ApiError, api_error, problem_response
+from sprag_study.sentences import Sentence
+from sprag_study.service.faults import FaultError, shown
+from sprag_study.service.http.problems import ApiError, as_api_error, problem_response
 from sprag_study.service.http.web.problem_page import problem_page, wants_page
-from sprag_study.service.storage.errors import PageTokenError, StoreError
+from sprag_study.service.storage.errors import StoreError
 from sprag_study.service.views.queries import parameter_fault
 from sprag_study.worker.states import TransitionError
 
 _log = logging.getLogger("sprag.service")
 
-_LATER = {"Retry-After": "5"}
-
-
-def as_api_error(error: Exception) -> ApiError | None:
-    """The error for the client; None when the exception is a bug in the program."""
-    if isinstance(error, FaultError):
-        return api_error(error)
-    if isinstance(error, PageTokenError):
-        fault = parameter_error("page_token", "invalid-text", str(error), allowed="`next_page_token` of a page")
-        return api_error(fault)
-    if isinstance(error, TransitionError | StoreError):
-        kind: Kind = error.code if error.code in PROBLEM_TYPES else "unavailable"
-        return ApiError(kind, _sentence(error), headers=_LATER if kind == "unavailable" else None)
-    return None
-
 
 def _answer(request: Request, error: ApiError) -> Response:
     """The error as a page for a browser, as a problem document for everybody else."""
     return problem_page(request, error) or problem_response(error)
-
-
-def _sentence(error: Exception) -> str:
-    clause = error.args[0] if error.args else ""
-    return joined("", (Whole(clause),)) if isinstance(clause, Sentence) else whole(str(error))
 
 
 def _known(request: Request, error: Exception) -> Response:

@@ -7,11 +7,15 @@ from typing import Any, Final, cast
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.responses import Response
 
-from sprag_study.service.faults import Fault, FaultError, Kind
+from sprag_study.sentences import Sentence, Whole, joined, whole
+from sprag_study.service.faults import Fault, FaultError, Kind, parameter_error
 from sprag_study.service.json_text import to_bytes
+from sprag_study.service.storage.errors import PageTokenError, StoreError
+from sprag_study.worker.states import TransitionError
 
 PROBLEM_MEDIA_TYPE = "application/problem+json"
 PROBLEM_PATH = "/problems/"
+_LATER: Final = {"Retry-After": "5"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +149,24 @@ def api_error(fault: FaultError) -> ApiError:
         return fault
     headers = {} if fault.retry_after is None else {"Retry-After": str(fault.retry_after)}
     return ApiError(cast("Kind", fault.code), fault.detail, fault.faults, headers)
+
+
+def as_api_error(error: Exception) -> ApiError | None:
+    """The error for the client; None when the exception is a bug in the program."""
+    if isinstance(error, FaultError):
+        return api_error(error)
+    if isinstance(error, PageTokenError):
+        fault = parameter_error("page_token", "invalid-text", str(error), allowed="`next_page_token` of a page")
+        return api_error(fault)
+    if isinstance(error, TransitionError | StoreError):
+        kind: Kind = error.code if error.code in PROBLEM_TYPES else "unavailable"
+        return ApiError(kind, _sentence(error), headers=_LATER if kind == "unavailable" else None)
+    return None
+
+
+def _sentence(error: Exception) -> str:
+    clause = error.args[0] if error.args else ""
+    return joined("", (Whole(clause),)) if isinstance(clause, Sentence) else whole(str(error))
 
 
 def problem_json(kind: ProblemType, detail: str, faults: Iterable[Fault] = ()) -> dict[str, Any]:

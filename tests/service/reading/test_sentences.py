@@ -27,7 +27,7 @@ from sprag_study.sentences import (
 )
 from sprag_study.service.cli.console import warning_lines
 from sprag_study.service.faults import FaultError, WarningCode
-from sprag_study.service.http.handlers import as_api_error
+from sprag_study.service.http.problems import as_api_error
 from sprag_study.service.languages import language
 from sprag_study.service.languages.recorded import MANY_STUDIES, NOT_IN_TIME
 from sprag_study.service.reading.quantities import Units
