@@ -40,7 +40,7 @@ def test_every_shape_of_study_has_its_pages(service: Service, spec: dict[str, An
         for query in ("x=shaft.load", "z=efficiency", "z=efficiency&kind=contour", "lower=efficiency&point=0.2"):
             assert service.http.get(f"/studies/{study_id}?{query}").status_code in (200, 422), query
     page = service.http.get(f"/studies/{study_id}?units=workshop").text
-    assert re.search(r"<p>Clutch: degree 1 reaches the accuracy .* windup of \S+ deg;", page)
+    assert re.search(r"<p>Clutch: degree 1 reaches the accuracy .* windup of 0\.03 rad;", page)
     assert service.http.get(f"/new?clone={study_id}").status_code == 200
 
 
