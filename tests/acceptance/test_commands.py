@@ -169,7 +169,9 @@ def test_a_worker_alone_runs_what_a_service_was_given(tmp_path: Path, sprag: Spr
     database = tmp_path / "study.sqlite3"
     assert sprag("admin", "db", "upgrade", "--db", database).code == 0
     worker = subprocess.Popen(
-        [*COMMAND, "admin", "worker", "--db", str(database), "--processes", "1"], stderr=subprocess.PIPE, env=environment()
+        [*COMMAND, "admin", "worker", "--db", str(database), "--processes", "1"],
+        stderr=subprocess.PIPE,
+        env=environment(),
     )
     assert worker.stderr is not None
     with worker, worker.stderr as said:
