@@ -15,7 +15,7 @@ _SHOWN = (
 )  # fmt: skip
 
 
-def regimes(spec: SpecFile, case: CaseOption = 0, points: PointsFile = None) -> None:
+def regimes(spec: SpecFile, case: CaseOption = 0, points_file: PointsFile = None) -> None:
     """The regimes to which one case comes from its many starts, with their shares."""
     import numpy as np
 
@@ -23,7 +23,7 @@ def regimes(spec: SpecFile, case: CaseOption = 0, points: PointsFile = None) -> 
     from sprag_study.worker.models.starts import has_starts
     from sprag_study.worker.reuse import taken
 
-    study = read_study(spec, points).study
+    study = read_study(spec, points_file).study
     require_cases(study, [case])
     if not has_starts(study.run):
         raise wrong_option(

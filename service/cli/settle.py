@@ -34,7 +34,7 @@ def settle(
         list[int] | None,
         typer.Option("--case", min=0, metavar="N", help="Number of a case, from 0; may be repeated. Default: all."),
     ] = None,
-    points: PointsFile = None,
+    points_file: PointsFile = None,
     file: OutputFile = None,
     at_most: Annotated[
         int | None,
@@ -50,7 +50,7 @@ def settle(
     from sprag_study.worker.models import OK, study_results
     from sprag_study.worker.models.starts import count_of
 
-    study = _settled(read_study(spec, points).study, at_most)
+    study = _settled(read_study(spec, points_file).study, at_most)
     cases = _chosen(study, case)
     with output(file) as write:
         blocks = _blocks(study, cases)
