@@ -28,7 +28,9 @@ PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglo
 def commands() -> dict[str, set[str]]:
     """Every command and group, such as "admin db upgrade" and "admin db", and its options."""
     root: Any = command_line("en")
-    common = {option for parameter in root.params for option in parameter.opts}
+    common = {
+        option for parameter in root.params if not getattr(parameter, "hidden", False) for option in parameter.opts
+    }
     found: dict[str, set[str]] = {}
 
     def collect(command: Any, path: tuple[str, ...]) -> set[str]:

@@ -17,8 +17,14 @@ FILES = sorted(manual.FOLDER.glob("*.1"))
 
 def test_every_command_has_a_page_with_its_options() -> None:
     assert {file.name: file.read_text() for file in FILES} == manual.pages()
-    for name, options in commands().items():
-        text = (manual.FOLDER / f"sprag-{name.replace(' ', '-')}.1").read_text().replace(r"\-", "-")
+    names = commands()
+    for name, options in names.items():
+        if not name or any(other.startswith(f"{name} ") for other in names):
+            continue  # a group: its commands have their own pages
+        # What a group of commands has in common stands on its page.
+        words = ["sprag", *name.split()]
+        above = ["-".join(words[:count]) for count in range(1, len(words) + 1)]
+        text = "".join((manual.FOLDER / f"{page}.1").read_text() for page in above).replace(r"\-", "-")
         assert [option for option in options if option.startswith("-") and option not in text] == [], name
 
 
