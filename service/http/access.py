@@ -72,10 +72,10 @@ class Access:
         self._read_at: float | None = None
         self._reading: asyncio.Future[None] | None = None
 
-    async def refresh(self) -> None:
-        """Read the tokens again when the cache is stale; raises StoreError."""
-        now = time.monotonic()
-        if self._people is None or (self._read_at is not None and now - self._read_at < BELIEVED_SECONDS):
+    async def refresh(self, *, changed: bool = False) -> None:
+        """Read the tokens again when the cache is stale, or users or tokens were ``changed``; raises StoreError."""
+        known = self._read_at is not None and time.monotonic() - self._read_at < BELIEVED_SECONDS
+        if self._people is None or (known and not changed):
             return
         if self._reading is None or self._reading.get_loop() is not asyncio.get_running_loop():
             self._reading = asyncio.ensure_future(self._read_again(self._people))

@@ -56,5 +56,6 @@ ROUNDS_DONE: Final = N_("round {round} of at most {most} is done")
 NO_ROUND: Final = N_("no round is done")
 #: Why a token lets nobody in.
 TOKEN_EXPIRED: Final = N_("The token {token} expired at {time}; `sprag admin token create` creates another.")
+NO_LONGER: Final = N_("You may no longer do this: you were removed, your token was revoked, or your role was changed.")
 TOKEN_REVOKED: Final = N_("The token {token} was revoked.")
 TOKEN_OF_REMOVED_USER: Final = N_("The token {token} belongs to the user {user}, who was removed.")

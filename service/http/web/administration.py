@@ -52,44 +52,55 @@ def listed_tokens(context: Context, owner: str | None = None) -> list[tuple[Toke
     ]
 
 
-def change_user(context: Context, values: Mapping[str, str]) -> None:
-    """Do what a form of a user asks for; raises FaultError and StoreError."""
+def change_user(context: Context, values: Mapping[str, str], *, first: bool) -> tuple[str, TokenRecord] | None:
+    """Do what a form of a user asks for; raises FaultError and StoreError.
+
+    ``first``: requests need no token yet, and will from the first user on. So this is an administrator, who gets a
+    token at once: its secret and record.
+    """
     people, name = context.store.people, values.get("name", "").strip()
     do = choice_of("do", values.get("do", ""), ("add", "change", "remove", "restore", "hand-over"))
     if do == "hand-over":
         people.hand_over(name, values.get("to", ""))
-        return
-    role = Role(choice_of("role", values.get("role", ""), list(Role)))
-    if name == own_name() and (do == "remove" or (do == "change" and role is not Role.ADMINISTRATOR)):
-        raise parameter_error("role", "conflict", N_("is your own: another administrator can take it from you"), name)
+        return None
     if do in ("remove", "restore"):
         people.change_user(name, removed=do == "remove")
-        return
+        return None
+    role = Role(choice_of("role", values.get("role", ""), list(Role)))
     cases, storage, checks = (_count(values, field, below) for field, below in _QUOTAS.items())
     quota = Quota(cases, None if storage is None else storage * _MIB, checks)
     if do == "change":
+        if any(user.name == name and user.removed_at is not None for user in people.users()):
+            raise parameter_error("name", "conflict", N_("is removed: restore this user first"), name)
         people.change_user(name, role, quota)
-        return
+        return None
+    if first and role is not Role.ADMINISTRATOR:
+        raise parameter_error("role", "conflict", N_("of the first user must be administrator"), role)
     try:
         people.add_user(user_name(name), role, quota)
     except UserExistsError as error:
         raise parameter_error(
             "name", "conflict", N_("is a user already, or was one who can be restored"), name
         ) from error
+    return people.create_token(name, TokenScope.WRITE, owner=name) if first else None
 
 
-def change_token(context: Context, values: Mapping[str, str], *, every: bool) -> tuple[str, TokenRecord] | None:
+def change_token(
+    context: Context, values: Mapping[str, str], *, every: bool, first: bool = False
+) -> tuple[str, TokenRecord] | None:
     """Do what a form of a token asks for, of ``every`` user or of the reader: secret and record of a new token.
 
-    Raises FaultError and StoreError.
+    ``first`` is that of `change_user`. Raises FaultError and StoreError.
     """
     people, user = context.store.people, own_name()
     do = choice_of("do", values.get("do", ""), ("create", "renew", "revoke"))
+    if first:
+        raise parameter_error("user", "required", N_("is missing: add an administrator first, who gets a token"))
     if do == "create":
         owner = (values.get("user") or None) if every else user
         if owner is None and not every:
             raise parameter_error("user", "required", N_("is missing: your token belongs to no user"))
-        days = _count(values, "days", _MOST_DAYS + 1)
+        days = _count(values, "days", _MOST_DAYS + 1, least=1)
         ends = context.store.clock.now() + timedelta(days=days) if days else None
         scope = TokenScope(choice_of("scope", values.get("scope", ""), list(TokenScope)))
         return people.create_token(token_name(values.get("name", "").strip()), scope, owner=owner, expires_at=ends)
@@ -102,10 +113,10 @@ def change_token(context: Context, values: Mapping[str, str], *, every: bool) ->
     return None
 
 
-def _count(values: Mapping[str, str], field: str, below: int) -> int | None:
-    """A whole number from 0 of a form; None where the field is empty."""
+def _count(values: Mapping[str, str], field: str, below: int, least: int = 0) -> int | None:
+    """A whole number of a form; None where the field is empty."""
     text = values.get(field, "").strip()
     number = whole_number(text, below)
-    if text and number is None:
-        raise parameter_error(field, "out-of-range", N_("must be a whole number"), text, f"0 … {below - 1}")
+    if text and (number is None or number < least):
+        raise parameter_error(field, "out-of-range", N_("must be a whole number"), text, f"{least} … {below - 1}")
     return number

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from threading import Lock
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from fastapi import Query, Request
@@ -19,8 +20,8 @@ from sprag_study.service.http.language import PARAMETER, keep_language
 from sprag_study.service.http.people import Action, Actor, Since, Target, Until, user_json
 from sprag_study.service.http.reading import PageChoice, keep, keep_zone
 from sprag_study.service.http.routers import page_router
+from sprag_study.service.http.threads import in_thread
 from sprag_study.service.http.web.administration import (
-    GRACE,
     administers,
     change_token,
     change_user,
@@ -34,11 +35,12 @@ from sprag_study.service.jobs.maintenance import backups
 from sprag_study.service.jobs.reports.channels import DeliveryError
 from sprag_study.service.jobs.reports.trial import try_mail, try_webhook
 from sprag_study.service.jobs.workers import worker_list
-from sprag_study.service.languages import N_
+from sprag_study.service.languages import N_, _
 from sprag_study.service.reading.faults import message
 from sprag_study.service.reading.quantities import KINDS, SI, TYPED, WORKSHOP, read_units
 from sprag_study.service.reading.reader import CAPTIONS, CODES, Choice, told
 from sprag_study.service.settings import effective
+from sprag_study.service.storage.errors import TokenNotFoundError, UserNotFoundError
 from sprag_study.service.storage.people.audit import AuditPage, audit_filter
 from sprag_study.service.storage.people.scopes import MAX_USER_NAME
 from sprag_study.service.zones import is_zone, zones
@@ -66,6 +68,8 @@ _OF_ADMINISTRATORS: Final = {
     "/me/settings": N_("Settings"),
 }
 _LISTED: Final = 100
+#: Held while a test of reports is being sent.
+_TRIAL: Final = Lock()
 
 
 def _parts() -> dict[str, str]:
@@ -138,10 +142,10 @@ def _fitting_units(given: Mapping[str, str]) -> str:
 
 
 @router.post("/me/tokens")
-def change_own_tokens(context: Ctx, request: Request, choice: PageChoice, values: Form) -> Response:
+async def change_own_tokens(context: Ctx, request: Request, choice: PageChoice, values: Form) -> Response:
     """Create, renew or revoke a token of the reader; a new secret stands on the page that answers, and nowhere else."""
-    status, shown = _changed(partial(change_token, context, values, every=False), values)
-    return _me(context, request, choice, "/", status, **shown) if shown else _back("/me#tokens")
+    status, shown = await _changed(partial(change_token, context, values, every=False), request, values)
+    return await in_thread(_me, context, request, choice, "/", status, **shown) if shown else _back("/me#tokens")
 
 
 @router.get("/me/users")
@@ -151,13 +155,16 @@ def users(context: Ctx, request: Request, user: Annotated[str, Query(max_length=
 
 
 @router.post("/me/users")
-def change_users(context: Ctx, request: Request, values: Form) -> Response:
+async def change_users(context: Ctx, request: Request, values: Form) -> Response:
     """Add or change a user, or do so with a token of anybody (``of`` is "token")."""
-    of_token = values.get("of") == "token"
-    change = partial(change_token, context, values, every=True) if of_token else partial(change_user, context, values)
-    status, shown = _changed(change, values)
+    of_token, first = values.get("of") == "token", not access_of(request).needed
+    if of_token:
+        change = partial(change_token, context, values, every=True, first=first)
+    else:
+        change = partial(change_user, context, values, first=first)
+    status, shown = await _changed(change, request, values)
     chosen = "" if of_token or values.get("do") == "add" else values.get("name", "")
-    return _users(context, request, chosen, status, **shown) if shown else _back("/me/users")
+    return await in_thread(_users, context, request, chosen, status, **shown) if shown else _back("/me/users")
 
 
 def _users(context: Context, request: Request, chosen: str, status: int = 200, **shown: Any) -> Response:
@@ -175,15 +182,25 @@ def _users(context: Context, request: Request, chosen: str, status: int = 200, *
     )
 
 
-def _changed(
-    change: Callable[[], tuple[str, TokenRecord] | None], values: Mapping[str, str]
+async def _changed(
+    change: Callable[[], tuple[str, TokenRecord] | None], request: Request, values: Mapping[str, str]
 ) -> tuple[int, dict[str, Any]]:
     """Status and what the page shows of a change: a new token, or what is wrong; nothing of any other."""
+    access = access_of(request)
+    first = not access.needed
     try:
-        created = change()
+        created = await in_thread(change)
     except FaultError as error:
-        return 422, {"values": values, "faults": {str(fault.where): message(fault) for fault in error.faults}}
-    return 200, {} if created is None else {"created": created, "renewed": values.get("do") == "renew", "grace": GRACE}
+        faults = {str(fault.where): message(fault) for fault in error.faults} or {"": told(error.detail)}
+    except UserNotFoundError:
+        faults = {"": _("There is no such user any more, or nobody is chosen.")}
+    except TokenNotFoundError:
+        faults = {"": _("There is no such token, or it is revoked, renewed or expired.")}
+    else:
+        await access.refresh(changed=True)
+        renewed = values.get("do") == "renew"
+        return 200, {} if created is None else {"created": created, "renewed": renewed, "first": first}
+    return 422, {"values": values, "faults": faults}
 
 
 def _back(address: str) -> Response:
@@ -198,15 +215,22 @@ def settings(context: Ctx) -> Response:
 
 @router.post("/me/settings")
 def try_reports(context: Ctx, values: Form) -> Response:
-    """Send a test mail or a test webhook, and say what came of it."""
-    send = {"mail": try_mail, "webhook": try_webhook}[choice_of("by", values.get("by", ""), ("mail", "webhook"))]
-    to, status, shown = values.get("to", "").strip(), 200, {}
-    try:
-        send(to, context.settings.reports, context.store.clock.now())
-    except DeliveryError as error:
-        status, shown = 422, {"problem": told(str(error))}
+    """Send a test mail or a test webhook, and say what came of it; one at a time, as each may wait for a minute."""
+    by = choice_of("by", values.get("by", ""), ("mail", "webhook"))
+    send = {"mail": try_mail, "webhook": try_webhook}[by]
+    to, status, shown = values.get("to", "").strip(), 422, {}
+    if not _TRIAL.acquire(blocking=False):
+        shown = {"problem": _("Another test is being sent: try again when it has come to an end.")}
     else:
-        shown = {"sent": to}
+        try:
+            context.store.audit.note("report.test", to[:_LISTED], by=by)
+            send(to, context.settings.reports, context.store.clock.now())
+        except DeliveryError as error:
+            shown = {"problem": told(str(error))}
+        else:
+            status, shown = 200, {"sent": to}
+        finally:
+            _TRIAL.release()
     found = list(effective(context.settings))
     return page("settings.html", status, parts=_parts(), part="/me/settings", settings=found, values=values, **shown)
 

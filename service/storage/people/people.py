@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any, Final
 import sqlalchemy as sa
 
 from sprag_study.sentences import Sentence
-from sprag_study.service.actor import Role, acting
-from sprag_study.service.faults import FaultError
-from sprag_study.service.languages import grouped, recorded
+from sprag_study.service.actor import Door, Role, acting
+from sprag_study.service.faults import FaultError, parameter_error
+from sprag_study.service.languages import N_, grouped, recorded
 from sprag_study.service.storage.components import COMPONENTS
 from sprag_study.service.storage.errors import TokenNotFoundError, UserExistsError, UserNotFoundError
 from sprag_study.service.storage.part import Part, micros_of, moment, optional_moment
@@ -98,6 +98,7 @@ class TokenRecord:
     """A token without its secret; ``digest`` is the SHA-256 of the secret in hexadecimal digits.
 
     ``owner`` is the user whose token it is, None for nobody's; ``used_at`` the time of its last use, to the minute.
+    A token that was renewed is revoked some time later: then ``revoked_at`` lies ahead.
     """
 
     id: str
@@ -112,7 +113,7 @@ class TokenRecord:
 
     def state_at(self, now: datetime, user: UserRecord | None) -> TokenState:
         """The state of the token; ``user`` is the record of its owner, None where there is none."""
-        if self.revoked_at is not None:
+        if self.revoked_at is not None and self.revoked_at <= now:
             return TokenState.REVOKED
         if self.owner is not None and (user is None or user.removed_at is not None):
             return TokenState.USER_REMOVED
@@ -144,6 +145,7 @@ class People(Part):
         """Add a user; raises UserExistsError, also for the name of a removed one."""
         values = {"name": name, "role": role.value, "created_at": self._now(), **_columns(quota or Quota())}
         with self.session.write() as connection:
+            _require_standing(connection, self._now())
             if connection.execute(sa.select(_U.name).where(_U.name == name)).first():
                 raise UserExistsError(f"there is a user {name!r} already, or was one, who can be restored")
             row = connection.execute(sa.insert(USERS).values(values).returning(USERS)).one()
@@ -160,19 +162,23 @@ class People(Part):
         """Change the given fields of a user, whose studies, schedules and tokens are kept; raises UserNotFoundError.
 
         A number of ``quota`` that is None is kept. Tokens of a removed user are worth nothing until the
-        user is restored.
+        user is restored. On pages the last administrator stays: raises FaultError.
         """
         given = {column: value for column, value in _columns(quota or Quota()).items() if value is not None}
         values: dict[str, Any] = {**given, **({} if role is None else {"role": role.value})}
         if removed is not None:
             values["removed_at"] = sa.func.coalesce(_U.removed_at, self._now()) if removed else None
         with self.session.write() as connection:
+            _require_standing(connection, self._now())
             row = None
             if values:
                 change = sa.update(USERS).where(_U.name == name).values(values).returning(USERS)
                 row = connection.execute(change).one_or_none()
             if row is None:
                 raise UserNotFoundError(name)
+            administer = (_U.role == Role.ADMINISTRATOR.value) & _U.removed_at.is_(None)
+            if acting().door is Door.PAGE and connection.execute(sa.select(_U.name).where(administer)).first() is None:
+                raise parameter_error("role", "conflict", N_("is that of the last administrator"), name)
             action = "user.change" if removed is None else "user.remove" if removed else "user.restore"
             said = {} if role is None else {"role": role.value}
             note(connection, self._now(), action, name, **said, **_set(quota))
@@ -184,6 +190,7 @@ class People(Part):
         Raises UserNotFoundError.
         """
         with self.session.write() as connection:
+            _require_standing(connection, self._now())
             for each in (name, heir):
                 require_user(connection, each, removed=each == name)
             present = STUDIES.c.deleted_at.is_(None) | (STUDIES.c.purge_at > self._now())  # those can be restored
@@ -234,24 +241,26 @@ class People(Part):
         """
         ends = None if expires_at is None else micros_of(expires_at)
         with self.session.write() as connection:
+            _require_standing(connection, self._now())
             fields = {"name": name, "scope": scope.value, "owner": owner}
             return _new_token(connection, self._now(), fields, ends)
 
     def renew_token(self, token_id: str, grace: timedelta) -> tuple[str, TokenRecord]:
-        """Another token of the same name, scope, owner and length of life; the former is valid for ``grace`` only.
+        """Another token of the same name, scope, owner and length of life; the former is valid for ``grace`` at most.
 
-        Returns what `create_token` returns; raises TokenNotFoundError, also for a revoked token, and UserNotFoundError.
+        Returns what `create_token` returns; raises TokenNotFoundError, also for one that was revoked or renewed, or
+        has expired, and UserNotFoundError.
         """
         c, now = TOKENS.c, self._now()
-        last = micros_of(moment(now) + grace)
+        valid = c.revoked_at.is_(None) & sa.func.coalesce(c.expires_at > now, sa.true())
         with self.session.write() as connection:
-            valid = c.revoked_at.is_(None)
+            _require_standing(connection, self._now())
             row = connection.execute(sa.select(TOKENS).where(c.id == token_id, valid)).one_or_none()
             if row is None:
                 raise TokenNotFoundError(token_id)
             ends = None if row.expires_at is None else now + row.expires_at - row.created_at
-            earliest = last if row.expires_at is None else min(last, row.expires_at)
-            connection.execute(sa.update(TOKENS).where(c.id == token_id).values(expires_at=earliest))
+            last = micros_of(moment(now) + grace)
+            connection.execute(sa.update(TOKENS).where(c.id == token_id).values(revoked_at=last))
             same = {"name": row.name, "scope": row.scope, "owner": row.owner}
             return _new_token(connection, now, same, ends, instead_of=token_id)
 
@@ -262,11 +271,13 @@ class People(Part):
 
     def revoke_token(self, token_id: str) -> TokenRecord:
         """Revoke a token; raises TokenNotFoundError. Revoking it twice has no further effect."""
+        now, revoked = self._now(), TOKENS.c.revoked_at
         with self.session.write() as connection:
+            _require_standing(connection, self._now())
             row = connection.execute(
                 sa.update(TOKENS)
                 .where(TOKENS.c.id == token_id)
-                .values(revoked_at=sa.func.coalesce(TOKENS.c.revoked_at, self._now()))
+                .values(revoked_at=sa.case((revoked <= now, revoked), else_=now))
                 .returning(TOKENS)
             ).one_or_none()
             if row is None:
@@ -323,6 +334,22 @@ def require_user(connection: sa.Connection, name: str, *, removed: bool = False)
     query = sa.select(_U.name).where(_U.name == name, sa.true() if removed else _U.removed_at.is_(None))
     if connection.execute(query).first() is None:
         raise UserNotFoundError(name)
+
+
+def _require_standing(connection: sa.Connection, now: int) -> None:
+    """Raise FaultError where who acts on a page was removed, revoked or given another role since the page was asked.
+
+    A service reads users and tokens anew every two seconds; what it read must not decide who may let people in.
+    """
+    actor = acting()
+    if actor.door is not Door.PAGE:
+        return
+    user = connection.execute(sa.select(USERS).where(_U.name == actor.user)).one_or_none()
+    token = connection.execute(sa.select(TOKENS.c.revoked_at).where(TOKENS.c.id == actor.token)).one_or_none()
+    removed = user is not None and user.removed_at is not None
+    lowered = user is not None and actor.everything and user.role != Role.ADMINISTRATOR.value
+    if removed or lowered or (token is not None and token.revoked_at is not None and token.revoked_at <= now):
+        raise FaultError("not-allowed", Sentence(recorded.NO_LONGER))
 
 
 def _new_token(

@@ -17,7 +17,7 @@ from pydantic import SecretStr
 from sprag_study.service.actor import Door, Role, act_as, of_machine
 from sprag_study.service.delivery import origin_of
 from sprag_study.service.storage.errors import TokenNotFoundError
-from sprag_study.service.storage.people.people import Quota
+from sprag_study.service.storage.people.people import Quota, UserRecord
 from sprag_study.service.storage.people.scopes import TokenScope, TokenState
 from tests.service.http.people import OWN, Office
 from tests.service.schedules.receivers import mail_server, webhook
@@ -32,6 +32,11 @@ SECRET = re.compile(r'<code id="secret"[^>]*>(sprag_[\w-]+)</code>')
 @pytest.fixture
 def office(settings: Settings, service: Service, connect: Callable[..., httpx.Client]) -> Office:
     return Office(settings, service, connect)
+
+
+def person(office: Office, name: str) -> UserRecord:
+    """The record of a user."""
+    return next(one for one in office.store.people.users() if one.name == name)
 
 
 def user(name: str, do: str, **fields: str) -> dict[str, str]:
@@ -72,11 +77,12 @@ def test_an_administrator_adds_changes_removes_and_restores_users(office: Office
         (user("new", "add", cases="-1"), "cases", "must be a whole number"),
         (user("new", "add", checks="65"), "checks", "allowed: 0 … 64"),
         (user("new", "add", role="king"), "role", "viewer, designer, administrator"),
-        (user("ada", "change"), "role", "is your own"),
-        (user("ada", "remove"), "role", "is your own"),
+        (user("ada", "change"), "role", "is that of the last administrator"),
+        (user("ada", "remove"), "role", "is that of the last administrator"),
         ({"of": "token", "do": "create", "name": "", "scope": "read"}, "name", "is not the name of a token"),
         ({"of": "token", "do": "create", "name": "x", "scope": "all"}, "scope", "read, write"),
         ({"of": "token", "do": "create", "name": "x", "scope": "read", "days": "0.5"}, "days", "whole number"),
+        ({"of": "token", "do": "create", "name": "x", "scope": "read", "days": "0"}, "days", "allowed: 1 … 36500"),
     ],
 )
 def test_what_cannot_be_is_said_at_its_field(office: Office, form: dict[str, str], field: str, said: str) -> None:
@@ -101,13 +107,18 @@ def test_users_create_renew_and_revoke_their_own_tokens(office: Office) -> None:
     assert abs(laptop.expires_at - laptop.created_at - timedelta(days=30)) < timedelta(minutes=1)
     renewed = dora.post("/me/tokens", data={"do": "renew", "id": laptop.id}, headers=OWN)
     (other,) = SECRET.findall(renewed.text)
-    assert "24 h more" in renewed.text
+    assert "The former one ends within a day." in renewed.text
     successor, former = people.tokens()[:2]
     assert (former.id, successor.name, successor.owner, successor.scope) == (laptop.id, "laptop", "dora", laptop.scope)
-    assert former.expires_at is not None
+    assert former.revoked_at is not None
+    assert timedelta(hours=23) < former.revoked_at - office.store.clock.now() <= timedelta(days=1)
+    assert former.state_at(office.store.clock.now(), person(office, "dora")) is TokenState.VALID
     assert successor.expires_at is not None
-    assert timedelta(hours=23) < former.expires_at - office.store.clock.now() <= timedelta(days=1)
     assert successor.expires_at - successor.created_at == laptop.expires_at - laptop.created_at
+    # A second click makes no second one.
+    again = dora.post("/me/tokens", data={"do": "renew", "id": laptop.id}, headers=OWN)
+    assert (again.status_code, SECRET.findall(again.text)) == (422, [])
+    assert "There is no such token, or it is revoked, renewed or expired." in again.text
     assert secret != other
     gone = dora.post("/me/tokens", data={"do": "revoke", "id": successor.id}, headers=OWN)
     assert (gone.status_code, gone.headers["location"]) == (303, "/me#tokens")
@@ -139,13 +150,55 @@ def test_nobody_reaches_the_tokens_of_others(office: Office) -> None:
     assert all(token.revoked_at is None for token in people.tokens())
 
 
-def test_the_first_token_says_that_requests_need_one_from_now_on(service: Service) -> None:
-    form = {"of": "token", "do": "create", "name": "first", "scope": "write", "user": ""}
-    answer = service.http.post("/me/users", data=form)
+def test_the_first_user_of_an_open_service_is_an_administrator_with_a_token(service: Service) -> None:
+    people = service.store.people
+    shown = service.http.get("/me/users").text
+    assert "The first user is an administrator and gets a token here" in shown
+    assert "New token" not in shown
+    for form in (user("ada", "add"), {"of": "token", "do": "create", "name": "x", "scope": "write", "user": ""}):
+        refused = service.http.post("/me/users", data=form)
+        assert refused.status_code == 422
+        assert 'role="alert"' in refused.text
+    assert (people.users(), people.tokens()) == ((), ())
+    answer = service.http.post("/me/users", data=user("ada", "add", role="administrator"))
     assert answer.status_code == 200
     assert "From now on every request to this service needs a token" in answer.text
     (secret,) = SECRET.findall(answer.text)
-    assert secret not in service.store.people.tokens()[0].digest
+    # At once, without a wait for the next reading of tokens.
+    assert service.http.get("/me/users").status_code in (303, 401)
+    with_token = service.http.get("/me/users", headers={"Authorization": f"Bearer {secret}"})
+    assert (with_token.status_code, secret in with_token.text) == (200, False)
+
+
+def test_who_lost_the_right_meanwhile_changes_nothing(office: Office) -> None:
+    ada, people = office.program("ada"), office.store.people
+    with act_as(of_machine(Door.COMMAND)):
+        people.add_user("bob", Role.ADMINISTRATOR)
+    assert ada.get("/me/users").status_code == 200  # the service knows her as an administrator, for two seconds
+    with act_as(of_machine(Door.COMMAND)):
+        people.change_user("ada", Role.DESIGNER)
+    before = people.users(), people.tokens()
+    for form in (
+        user("ada", "change", role="administrator"), user("eve", "add"), user("bob", "remove"),
+        {"of": "token", "do": "create", "name": "x", "scope": "write", "user": "bob"},
+    ):  # fmt: skip
+        assert ada.post("/me/users", data=form, headers=OWN).status_code in (403, 422), form
+    assert (people.users(), people.tokens()) == before
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        user("nix", "change"), user("nix", "restore"), user("nix", "hand-over", to="dora"),
+        user("dora", "hand-over", to=""), {"of": "token", "do": "revoke", "id": "tk_x"}, {"of": "token", "do": "renew"},
+        {"of": "token", "do": "create", "name": "x", "scope": "read", "user": "nix"}, {"name": "x"},
+    ],
+)  # fmt: skip
+def test_what_is_not_there_is_said_on_the_page(office: Office, form: dict[str, str]) -> None:
+    answer = office.program("ada").post("/me/users", data=form, headers=OWN)
+    assert answer.status_code == 422
+    (said,) = re.findall(r'<p class="fault" role="alert">(.+?)</p>', answer.text)
+    assert said
 
 
 def test_settings_have_their_origins_and_keep_secrets(
