@@ -63,7 +63,7 @@ def test_one_figure_has_the_spread_and_the_yield(service: Service) -> None:
     assert 'class="figure double"' in main, "as wide as the column"
     assert main.index("Yield</dt>") < main.index("<figure>") < main.index('class="tables"')
     assert main.count(' class="screen downloads"') == 1
-    assert len(re.findall(r'href="[^"]*format=(?:csv|json|svg|png|pdf)[^"]*" download', main)) == 10
+    assert len(re.findall(r'href="[^"]*format=(?:csv|json|svg|png|pdf)[^"]*" download', main)) == 12
 
 
 def test_the_spread_comes_from_the_inertia_of_a_press(service: Service) -> None:
