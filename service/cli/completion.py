@@ -55,7 +55,9 @@ def schedules(context: typer.Context, incomplete: str) -> list[tuple[str, str]]:
 
 def tokens(context: typer.Context, incomplete: str) -> list[tuple[str, str]]:
     """Ids of the tokens that are not revoked, each with its name, and names."""
-    found = _stored(context, lambda store: [token for token in store.people.tokens() if token.revoked_at is None])
+    found = _stored(
+        context, lambda store: [one for one in store.people.tokens() if not one.revoked_by(store.clock.now())]
+    )
     ids = [(token.id, f"{token.name}, {token.scope.value}") for token in found]
     return ids + _names(incomplete, ((token.name, token.id) for token in found))
 

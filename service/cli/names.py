@@ -36,7 +36,8 @@ def token_of(people: People, text: str) -> str:
     from sprag_study.service.client.matching import Named, meant
 
     with _one("ID", text, _("the id or name of a token"), _("the token is not unique")):
-        tokens = [Named(t.id, t.name, f"{t.id} ({t.name})") for t in people.tokens() if t.revoked_at is None]
+        now = people.clock.now()
+        tokens = [Named(t.id, t.name, f"{t.id} ({t.name})") for t in people.tokens() if not t.revoked_by(now)]
         return meant(text, tokens, "tokens", "tk_")
 
 

@@ -26,6 +26,7 @@ class DecimalCommas:
         if not lines:
             return b""
         out = io.StringIO()
+        csv.field_size_limit(max(csv.field_size_limit(), len(lines)))  # of one cell: a whole spec, for instance
         rows = csv.reader(io.StringIO(lines.decode("utf-8"), newline=""))
         csv.writer(out, delimiter=";", lineterminator="\n").writerows(map(_with_commas, rows))
         mark, self._mark = self._mark, b""

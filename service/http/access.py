@@ -77,6 +77,8 @@ class Access:
         known = self._read_at is not None and time.monotonic() - self._read_at < BELIEVED_SECONDS
         if self._people is None or (known and not changed):
             return
+        if changed and self._reading is not None:  # it may have begun before the change
+            await asyncio.shield(self._reading)
         if self._reading is None or self._reading.get_loop() is not asyncio.get_running_loop():
             self._reading = asyncio.ensure_future(self._read_again(self._people))
             self._reading.add_done_callback(self._has_read)

@@ -272,7 +272,8 @@ def create_app(
     own_store = store is None
     used_store = store or sound_store(settings, chunking(settings))
     try:
-        settings.require_safe(stored=any(token.revoked_at is None for token in used_store.people.tokens()))
+        now = used_store.clock.now()
+        settings.require_safe(stored=any(not token.revoked_by(now) for token in used_store.people.tokens()))
     except UnsafeSettingsError:
         if own_store:
             used_store.close()

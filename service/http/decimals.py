@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from typing import Annotated
-from urllib.parse import parse_qs
 
 from fastapi import Depends, Query
-from starlette.datastructures import MutableHeaders
+from starlette.datastructures import MutableHeaders, QueryParams
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from sprag_study.service.exports.decimal_commas import DecimalCommas
@@ -42,10 +41,7 @@ class InDecimals:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http" or b"decimal=comma" not in scope["query_string"]:
-            await self._app(scope, receive, send)
-            return
-        if parse_qs(scope["query_string"].decode("latin-1")).get("decimal") != ["comma"]:
+        if scope["type"] != "http" or QueryParams(scope["query_string"]).get("decimal") != "comma":
             await self._app(scope, receive, send)
             return
         # Ranges are of the bytes that are not sent.

@@ -46,7 +46,6 @@ from sprag_study.worker.limits import MAX_CURVE_VALUES
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag_study.service.results.curves import Curve, CurveQuery, Curves, Map
     from sprag_study.service.storage.store import Store
     from sprag_study.worker.models import ResultInfo
     from sprag_study.worker.planning.refine import Curve as Refined

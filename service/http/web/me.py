@@ -210,7 +210,7 @@ def _back(address: str) -> Response:
 @router.get("/me/settings")
 def settings(context: Ctx) -> Response:
     """Every setting with its origin, and forms that send a test mail or a test webhook."""
-    return page("settings.html", parts=_parts(), settings=list(effective(context.settings)), values={})
+    return _settings(context, values={})
 
 
 @router.post("/me/settings")
@@ -231,8 +231,12 @@ def try_reports(context: Ctx, values: Form) -> Response:
             status, shown = 200, {"sent": to}
         finally:
             _TRIAL.release()
+    return _settings(context, status, values=values, **shown)
+
+
+def _settings(context: Context, status: int = 200, **shown: Any) -> Response:
     found = list(effective(context.settings))
-    return page("settings.html", status, parts=_parts(), part="/me/settings", settings=found, values=values, **shown)
+    return page("settings.html", status, parts=_parts(), part="/me/settings", settings=found, **shown)
 
 
 @router.get("/me/workers")

@@ -25,7 +25,6 @@ from sprag_study.worker.study import without_drives
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag_study.service.results.curves import Fetch
     from sprag_study.service.storage.studies.records import CaseColumns
     from sprag_study.worker.arrays import Bools, Floats, Ints
     from sprag_study.worker.study import Study

@@ -111,9 +111,13 @@ class TokenRecord:
     expires_at: datetime | None = None
     used_at: datetime | None = None
 
+    def revoked_by(self, now: datetime) -> bool:
+        """Whether the token is revoked at that time."""
+        return self.revoked_at is not None and self.revoked_at <= now
+
     def state_at(self, now: datetime, user: UserRecord | None) -> TokenState:
         """The state of the token; ``user`` is the record of its owner, None where there is none."""
-        if self.revoked_at is not None and self.revoked_at <= now:
+        if self.revoked_by(now):
             return TokenState.REVOKED
         if self.owner is not None and (user is None or user.removed_at is not None):
             return TokenState.USER_REMOVED
@@ -170,14 +174,15 @@ class People(Part):
             values["removed_at"] = sa.func.coalesce(_U.removed_at, self._now()) if removed else None
         with self.session.write() as connection:
             _require_standing(connection, self._now())
-            row = None
+            row, administers = None, (_U.role == Role.ADMINISTRATOR.value) & _U.removed_at.is_(None)
+            before = connection.execute(sa.select(_U.name).where(administers)).scalars().all()
             if values:
                 change = sa.update(USERS).where(_U.name == name).values(values).returning(USERS)
                 row = connection.execute(change).one_or_none()
             if row is None:
                 raise UserNotFoundError(name)
-            administer = (_U.role == Role.ADMINISTRATOR.value) & _U.removed_at.is_(None)
-            if acting().door is Door.PAGE and connection.execute(sa.select(_U.name).where(administer)).first() is None:
+            left = connection.execute(sa.select(_U.name).where(administers)).first()
+            if acting().door is Door.PAGE and before and left is None:
                 raise parameter_error("role", "conflict", N_("is that of the last administrator"), name)
             action = "user.change" if removed is None else "user.remove" if removed else "user.restore"
             said = {} if role is None else {"role": role.value}

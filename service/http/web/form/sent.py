@@ -75,6 +75,8 @@ def _part_tolerances(values: Values) -> None:
         parts, field = with_last_unit(values[name].split("±", 1)), f"{own_name(name)}/plus_minus"
         if all(part.strip() for part in parts) and not values.get(field, "").strip():
             values |= {name: parts[0].strip(), field: parts[1].strip(), BATCH: "on"}
+            if UNIT + name in values:  # the unit beside the field is that of both numbers
+                values[UNIT + field] = values[UNIT + name]
 
 
 def changed_kinds(values: Mapping[str, str]) -> Values:

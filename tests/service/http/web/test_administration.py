@@ -16,6 +16,7 @@ from pydantic import SecretStr
 
 from sprag_study.service.actor import Door, Role, act_as, of_machine
 from sprag_study.service.delivery import origin_of
+from sprag_study.service.faults import FaultError
 from sprag_study.service.storage.errors import TokenNotFoundError
 from sprag_study.service.storage.people.people import Quota, UserRecord
 from sprag_study.service.storage.people.scopes import TokenScope, TokenState
@@ -184,6 +185,18 @@ def test_who_lost_the_right_meanwhile_changes_nothing(office: Office) -> None:
     ):  # fmt: skip
         assert ada.post("/me/users", data=form, headers=OWN).status_code in (403, 422), form
     assert (people.users(), people.tokens()) == before
+
+
+def test_where_nobody_administers_users_are_changed_all_the_same(service: Service) -> None:
+    store = service.store
+    with act_as(of_machine(Door.COMMAND)):
+        store.people.add_user("ann", Role.DESIGNER)
+    with act_as(of_machine(Door.PAGE)):
+        assert store.people.change_user("ann", quota=Quota(5)).quota.cases == 5
+        assert store.people.change_user("ann", removed=True).removed_at is not None
+        assert store.people.change_user("ann", Role.ADMINISTRATOR, removed=False).removed_at is None
+        with pytest.raises(FaultError, match="last administrator"):
+            store.people.change_user("ann", Role.VIEWER)
 
 
 @pytest.mark.parametrize(
