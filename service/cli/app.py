@@ -200,7 +200,7 @@ def _invoke(arguments: list[str]) -> int:
     except SystemExit as stop:
         if stop.code == 0 or COMPLETION_VARIABLE in os.environ:  # what completion ends with
             return cast("int", stop.code)
-        # typer turns a broken pipe into exit code 1, which here would mean that some cases failed.
+        # typer turns a broken pipe into exit code 1, which here means a fault of the program.
         raise _PipeClosedError from stop
     except Exception as error:
         command = command_for(error) if isinstance(error, ModuleNotFoundError) else None

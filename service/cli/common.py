@@ -1,7 +1,7 @@
 """What is said once for every command: the service, its token, and whether the answer is JSON.
 
 Options before or after the command come first, then ``SPRAG_SERVER`` and ``SPRAG_TOKEN``, then what ``sprag login``
-has kept.
+has kept; a service of the login gets the token of the login.
 """
 
 from __future__ import annotations
@@ -38,10 +38,14 @@ def wants_json() -> bool:
 def address() -> tuple[str, str | None]:
     """The address of the service and its token.
 
-    A token that is kept is for the service of the same login only: it is sent to no other.
+    A token that is kept is for the service of the same login only: it is sent to no other. ``SPRAG_TOKEN``, which may
+    be the secret of a service of this machine, is not sent to the service of a login.
     """
     given, kept = CURRENT.get(), profile()
-    server = given.server or os.environ.get("SPRAG_SERVER") or kept.get("server") or DEFAULT_SERVER
+    named = given.server or os.environ.get("SPRAG_SERVER")
+    if not named and "server" in kept:
+        return kept["server"], given.token or kept.get("token", "")
+    server = named or DEFAULT_SERVER
     token = given.token or os.environ.get("SPRAG_TOKEN")
     return server, token or (kept.get("token") if server == kept.get("server") else None)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Final, TypeVar
 
 import typer
 
@@ -140,12 +140,13 @@ def _of_study(context: typer.Context, parts: Sequence[str]) -> list[tuple[str, s
 
 def _asked(context: typer.Context, ask: Callable[[Client], list[Offered]]) -> list[Offered]:
     """What the service of the command answers; nothing where none answers."""
+    from sprag_study.service.cli.common import address
     from sprag_study.service.cli.console import CommandFailureError
     from sprag_study.service.client import Client, RefusedError, UnreachableError
 
-    given: dict[str, Any] = context.params
+    (server, token), given = address(), context.params
     try:
-        with Client(given.get("server"), given.get("token"), retry=0.0, timeout=_TIMEOUT) as client:
+        with Client(given.get("server") or server, given.get("token") or token, retry=0.0, timeout=_TIMEOUT) as client:
             return ask(client)
     except (CommandFailureError, RefusedError, UnreachableError, ValueError):  # ValueError: the address of the service
         return []

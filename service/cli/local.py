@@ -1,4 +1,4 @@
-"""Commands that need no service: run, validate, preview, trajectory, presets."""
+"""Commands that need no service: run, check, presets."""
 
 from __future__ import annotations
 

@@ -9,9 +9,9 @@ from typing import Annotated
 
 import typer
 
-from sprag_study.service.cli.common import CURRENT, Common, profile_file, wants_json
+from sprag_study.service.cli.common import CURRENT, profile_file, wants_json
 from sprag_study.service.cli.console import say, write_json
-from sprag_study.service.cli.remote import connection
+from sprag_study.service.cli.remote import served_by
 from sprag_study.service.languages import _
 
 
@@ -23,8 +23,7 @@ def login(
     The token is that of --token or SPRAG_TOKEN, or it is asked for; an empty one is none.
     """
     token = CURRENT.get().token or os.environ.get("SPRAG_TOKEN") or _asked()
-    CURRENT.set(Common(server, token or None, wants_json()))
-    with connection() as client:
+    with served_by(server, token) as client:
         me = client.me()
     file = profile_file()
     file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)

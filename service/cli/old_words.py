@@ -14,6 +14,8 @@ _VIEWS: Final = (
     "answers", "basin", "branch", "calibration", "cases", "diagram", "engagements", "explore", "front", "map",
     "regimes", "ribbon", "rounds", "section", "sensitivity", "strobes", "trajectory", "transient", "yield",
 )  # fmt: skip
+#: What settings of a case are called as options, where this is not their name.
+_OPTIONS: Final = {("diagram", "points"): "values", ("basin", "points"): "grid"}
 #: The new name by the old one; ID is the argument, which stands behind both.
 OLD: Final = {
     "validate": "check",
@@ -34,18 +36,23 @@ def forwarded(words: Sequence[str]) -> tuple[list[str], str]:
     if name not in OLD:
         return list(words), ""
     new = [word for word in OLD[name].split() if word != "ID"]
-    return ["show", *_of_case(rest)] if name == "case" else [*new, *rest], OLD[name]
+    if name == "case":
+        shown = _of_case(rest)
+        return ["show", *shown], OLD[name] if shown[0] == "case" else f"show ID {shown[0]} --case N"
+    return [*new, *rest], OLD[name]
 
 
 def _of_case(words: Sequence[str]) -> list[str]:
     """``ID N [PART] --set NAME=VALUE`` of a case: its part is a view, its number and the settings are options."""
     named: list[str] = []
     options: list[str] = []
+    part = next((word for word in words if word in _VIEWS), "")
     rest = iter(words)
     for word in rest:
         if word == "--set":
             name, equals, value = next(rest, "").partition("=")
-            options.append(f"--{name.strip().replace('_', '-')}{equals}{value.strip()}")
+            option = _OPTIONS.get((part, name.strip()), name.strip().replace("_", "-"))
+            options.append(f"--{option}{equals}{value.strip()}")
         elif word.startswith("-"):
             options += [word, *(islice(rest, 1) if word in ("-o", "--output") else ())]
         else:

@@ -1,4 +1,4 @@
-"""``sprag show ID regimes``: the regimes to which one case comes from its many starts, run here."""
+"""``sprag show SPEC regimes``: the regimes to which one case comes from its many starts, run here."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Final
 
-from sprag_study.service.cli.common import DEFAULT_SERVER, wants_json
+from sprag_study.service.cli.common import DEFAULT_SERVER, profile, profile_file, wants_json
 from sprag_study.service.cli.configured import read_settings
 from sprag_study.service.cli.console import WrongInputError, show_table, write_json
 from sprag_study.service.faults import Fault
@@ -60,11 +60,13 @@ def _of_commands() -> Iterator[EffectiveSetting]:
         where = "SPRAG_COMPILER"
         fault = Fault(where, "invalid-choice", N_("is not a way to compile"), os.environ.get(where), "programs, plain")
         raise WrongInputError("invalid-settings", _("invalid setting"), [fault]) from error
+    login = profile().get("server")
     defaults = {
-        "SPRAG_SERVER": DEFAULT_SERVER,
+        "SPRAG_SERVER": login or DEFAULT_SERVER,
         "SPRAG_KERNEL_CACHE": str(models.cache_folder()),
         "SPRAG_COMPILER": "programs",
     }
     for name in VARIABLES:
         value = os.environ.get(name, "")
-        yield EffectiveSetting(name, value or defaults.get(name, ""), name if value else DEFAULT_ORIGIN)
+        other = str(profile_file()) if name == "SPRAG_SERVER" and login else DEFAULT_ORIGIN
+        yield EffectiveSetting(name, value or defaults.get(name, ""), name if value else other)

@@ -1,4 +1,4 @@
-"""``sprag show ID settled``: the settled motions of cases."""
+"""``sprag show SPEC settled``: the settled motions of cases."""
 
 from __future__ import annotations
 

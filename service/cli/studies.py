@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import islice
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import Annotated, Final
 
 import typer
 
@@ -14,9 +14,6 @@ from sprag_study.service.cli.console import show_table, time_text, write_json
 from sprag_study.service.cli.remote import connection
 from sprag_study.service.languages import _
 from sprag_study.worker.states import StudyState
-
-if TYPE_CHECKING:
-    pass
 
 #: Most studies of one request.
 _PAGE: Final = 100

@@ -197,7 +197,9 @@ def _expanded(base: Any, pattern: Sequence[str], before: str = "") -> Iterator[s
 def _put(base: Any, path: Sequence[str], value: object) -> Any:
     """A copy of a machine with another value at a path."""
     name, *rest = path
-    if isinstance(base, Sequence) and name.isdecimal() and int(name) < len(base):
+    if isinstance(base, Sequence) and not isinstance(base, str):
+        if not name.isdecimal() or int(name) >= len(base):
+            raise ArgumentError("path", name, f"a place from 0 to {len(base) - 1}")
         place = int(name)
         return [*base[:place], _put(base[place], rest, value) if rest else value, *base[place + 1 :]]
     inner = base if isinstance(base, Mapping) else {}

@@ -39,7 +39,7 @@ class AsyncConnection:
     server : str, optional
         Its address; by default that in ``SPRAG_SERVER``, else ``http://127.0.0.1:8000``.
     token : str, optional
-        Its token; by default that in ``SPRAG_TOKEN``.
+        Its token; by default that in ``SPRAG_TOKEN``; "" for none.
     retry : float
         Seconds for which requests are repeated, with growing pauses, while a service that has answered before does not
         answer, for instance during a restart. Only requests that may be sent twice are repeated; 0 repeats none.
@@ -63,7 +63,7 @@ class AsyncConnection:
     ) -> None:
         chosen = os.environ.get("SPRAG_SERVER") or DEFAULT_SERVER if server is None else server
         self.server = chosen.rstrip("/")
-        options = connection_options(self.server, token or os.environ.get("SPRAG_TOKEN"))
+        options = connection_options(self.server, os.environ.get("SPRAG_TOKEN") if token is None else token)
         self._http = httpx.AsyncClient(transport=transport, **options | {"timeout": within(timeout)})
         self.retry = retry
         self._answered = False

@@ -18,6 +18,7 @@ from sprag_study.service.cli import common, components, doctor
 from sprag_study.service.cli.app import command_line
 from sprag_study.service.cli.groups import common_first
 from sprag_study.service.cli.old_words import OLD, forwarded
+from sprag_study.service.client import Client
 from sprag_study.service.storage.people.scopes import TokenScope
 from tests.conftest import Finished
 from tests.service.conftest import Service
@@ -78,6 +79,15 @@ def test_old_names_keep_their_arguments() -> None:
         "show", "trajectory", "st_1", "--case", "4", "--from=6 periods", "-o", "a.csv",
     ]  # fmt: skip
     assert forwarded(["list", "curve"]) == (["list", "curve"], "")
+
+
+@pytest.mark.parametrize(
+    ("view", "option"), [("basin", "--grid=10"), ("diagram", "--values=10"), ("branch", "--points=10")]
+)
+def test_settings_of_a_case_have_the_names_of_today(view: str, option: str) -> None:
+    words, new = forwarded(["case", "st_1", "3", view, "--set", "points=10"])
+    assert words == ["show", view, "st_1", "--case", "3", option]
+    assert new == f"show ID {view} --case N"
 
 
 def test_common_options_stand_anywhere() -> None:
@@ -176,6 +186,21 @@ def test_components_are_listed_with_their_units(
     shown = sprag("component", "list").out
     assert "windup_limit 0.1 rad" in shown
     assert "backlash 0.3°" in shown or "backlash 0.3 deg" in shown
+
+
+def test_the_secret_of_this_machine_is_not_sent_to_the_service_of_a_login(
+    login: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("SPRAG_SERVER", raising=False)
+    monkeypatch.setenv("SPRAG_TOKEN", "a-secret-of-this-machine")
+    login.parent.mkdir(parents=True)
+    for kept, sent in (({}, ""), ({"token": "kept"}, "kept")):
+        login.write_text(json.dumps({"server": "http://far.example", **kept}))
+        assert common.address() == ("http://far.example", sent)
+    monkeypatch.setenv("SPRAG_SERVER", "http://near.example")
+    assert common.address() == ("http://near.example", "a-secret-of-this-machine")
+    with Client("http://far.example", "") as client:
+        assert "authorization" not in client._http.headers
 
 
 def test_a_damaged_login_is_none(login: Path, monkeypatch: pytest.MonkeyPatch) -> None:

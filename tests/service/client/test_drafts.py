@@ -85,6 +85,11 @@ def test_a_name_that_is_none_or_several_is_refused(name: str, allowed: str) -> N
         drive(2).vary({name: [1.0]})
 
 
+def test_a_part_that_is_not_there_is_refused() -> None:
+    with pytest.raises(ArgumentError, match="a place from 0 to 0"):
+        drive(1).hold({"pendulums.1.mass": "0.4 kg"})
+
+
 def test_a_draft_of_another_model_is_refused() -> None:
     with pytest.raises(ArgumentError, match="a spec of the model 'vibration-drive'"):
         sprag.Drive.of("press")
