@@ -33,6 +33,8 @@ from sprag_study.worker.study import Axis, Study
 
 #: The times are those in the database; looking more often would only take a core from the pool.
 _POLL_SECONDS = 0.1
+#: Longest wait for one study: whatever it is, the workers of a service that takes so long do not work.
+_MOST_SECONDS = 3600
 
 
 def timed(study: Study, duration: list[Any]) -> dict[str, Any]:
@@ -77,7 +79,9 @@ def engine_alone(pool: Pool, study: Study, chunk: int) -> float:
 def through_the_service(store: Store, study: Study) -> tuple[float, int]:
     """Seconds from submission to the last row in the database, and the cases of a chunk."""
     record = store.studies.create({}, study, fresh=True)
+    limit = time.monotonic() + _MOST_SECONDS
     while not (record := store.studies.get(record.id)).state.terminal:
+        assert time.monotonic() < limit, f"the study has not ended within {_MOST_SECONDS} s"
         time.sleep(_POLL_SECONDS)
     assert record.ok == study.cases, store.studies.progress(record.id)
     assert record.finished_at is not None

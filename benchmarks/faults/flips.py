@@ -1,9 +1,9 @@
 """Single bits of a database file are flipped: each is noticed, or changes none of the numbers that are told.
 
-Each flip is made in a copy of the database of two finished studies, with the service stopped. Then the copy is opened,
-looked over as by `sprag admin db check`, and what is told is read: every row, the specs, the parameters of the cases,
-and the numbers of cases by ending, regime and flag. A flip is silent where any of this differs and nobody says so. What
-the digests do not cover (names, states, times and reasons of studies) is counted apart.
+Each flip is made in a copy of the database of two finished studies, with the service stopped. Then the program opens
+the copy, checks it as `sprag admin db check` does, and reads every row, the specs, the parameters of the cases, and
+the numbers of cases by ending, regime and flag. A flip is silent if any of this differs and the program reports nothing.
+Names, states, times and reasons of studies, which the digests do not cover, are counted apart.
 """
 
 from __future__ import annotations

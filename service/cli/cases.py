@@ -69,33 +69,33 @@ def case(study_id: StudyId, case: CaseOption = 0) -> None:
     from sprag_study.service.client.wire import case_path
 
     with connection() as client:
-        found = client.request("GET", case_path(study_of(client, study_id), case, ""))
+        shown = client.request("GET", case_path(study_of(client, study_id), case, ""))
     if wants_json():
-        write_json(found)
+        write_json(shown)
         return
-    meaning = f"{found['ending']}. {_(found['ending_meaning'])}"
-    say(_("case {case}: {text}", case=found["case"], text=meaning))
-    say(*(f"{flag}: {_(meaning)}" for flag, meaning in found["flag_meanings"].items()))
-    units = {name: "" if unit == "1" else unit for name, unit in found["units"].items()}
-    for title, values in ((_("parameters"), found["parameters"]), (_("results"), found["results"])):
+    meaning = f"{shown['ending']}. {_(shown['ending_meaning'])}"
+    say(_("case {case}: {text}", case=shown["case"], text=meaning))
+    say(*(f"{flag}: {_(meaning)}" for flag, meaning in shown["flag_meanings"].items()))
+    units = {name: "" if unit == "1" else unit for name, unit in shown["units"].items()}
+    for title, values in ((_("parameters"), shown["parameters"]), (_("results"), shown["results"])):
         rows = [(name, value, units.get(name, "")) for name, value in values.items()]
         show_table(title, ((_("name"), False), (_("value"), True), (_("unit"), False, True)), rows)
 
 
 def _first(pages: Iterable[dict[str, Any]], limit: int) -> tuple[list[dict[str, Any]], dict[str, str]]:
     """At most ``limit`` cases, and the units of their columns."""
-    found: list[dict[str, Any]] = []
+    shown: list[dict[str, Any]] = []
     units: dict[str, str] = {}
     for page in pages:
-        found, units = [*found, *page["cases"]], page.get("units", {})  # an older service has none
-        if len(found) >= limit:
+        shown, units = [*shown, *page["cases"]], page.get("units", {})  # an older service has none
+        if len(shown) >= limit:
             break
-    return found[:limit], units
+    return shown[:limit], units
 
 
-def _show(found: Sequence[dict[str, Any]], results: Sequence[str], units: Mapping[str, str]) -> None:
+def _show(shown: Sequence[dict[str, Any]], results: Sequence[str], units: Mapping[str, str]) -> None:
     """A row for each case: its parameters, how it ended, its regime and flags, and the chosen results."""
-    first = found[0]
+    first = shown[0]
     unknown = [name for name in results if name not in first["results"]]
     if unknown:
         allowed = ", ".join(first["results"])
@@ -113,6 +113,6 @@ def _show(found: Sequence[dict[str, Any]], results: Sequence[str], units: Mappin
             ", ".join(case["flags"]),
             *(case["results"][name] for name in (*kinds, *results)),
         )
-        for case in found
+        for case in shown
     )
     show_table("", columns, rows)

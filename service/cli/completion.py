@@ -13,6 +13,7 @@ from sprag_study.worker.codes import ENDING_CODES, FLAG_MASKS, PENDING, REGIME_C
 
 if TYPE_CHECKING:
     from sprag_study.service.client import Client
+    from sprag_study.service.storage.people.people import TokenRecord
     from sprag_study.service.storage.store import Store
 
 #: Variable in which typer's scripts ask for completions, or people for such a script.
@@ -55,11 +56,14 @@ def schedules(context: typer.Context, incomplete: str) -> list[tuple[str, str]]:
 
 def tokens(context: typer.Context, incomplete: str) -> list[tuple[str, str]]:
     """Ids of the tokens that are not revoked, each with its name, and names."""
-    found = _stored(
-        context, lambda store: [one for one in store.people.tokens() if not one.revoked_by(store.clock.now())]
-    )
-    ids = [(token.id, f"{token.name}, {token.scope.value}") for token in found]
-    return ids + _names(incomplete, ((token.name, token.id) for token in found))
+
+    def valid(store: Store) -> list[TokenRecord]:
+        now = store.clock.now()
+        return [token for token in store.people.tokens() if not token.revoked_by(now)]
+
+    records = _stored(context, valid)
+    ids = [(token.id, f"{token.name}, {token.scope.value}") for token in records]
+    return ids + _names(incomplete, ((token.name, token.id) for token in records))
 
 
 def users(context: typer.Context) -> list[tuple[str, str]]:

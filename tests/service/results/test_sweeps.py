@@ -18,7 +18,7 @@ from sprag_study.service.client import AsyncClient, Client
 from sprag_study.service.client.frames import Curves, grid_of, table_of
 from sprag_study.service.figures.curves import curves_figure
 from sprag_study.service.figures.svg import svg
-from sprag_study.service.http.web.form.spec import field_of, spec_of, values_of
+from sprag_study.service.http.web.form.spec import spec_of, values_of
 from sprag_study.service.jobs.local import run_here
 from sprag_study.service.jobs.start_from import with_start
 from sprag_study.service.results.curve_cases import stored_curves
@@ -32,6 +32,7 @@ from sprag_study.worker.models.starts import motion_of
 from sprag_study.worker.study import Study
 from tests.service.conftest import API, PortalTransport, Service
 from tests.service.figures.seen import seen
+from tests.service.http.web.fields import field_of
 from tests.service.spec_sample import changed
 from tests.service.swept_study import DOWN, SPEC, UP, swept_study
 

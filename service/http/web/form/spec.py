@@ -333,11 +333,6 @@ def spec_of(values: Mapping[str, str]) -> tuple[dict[str, Any], Faults]:
     return spec, form.faults
 
 
-def field_of(pointer: str, values: Mapping[str, str]) -> str:
-    """The field beside which a fault at ``pointer`` of the spec is shown; "" for the whole form."""
-    return form_with_spec(values)[1].field_of(pointer)
-
-
 def values_of(spec: Mapping[str, Any]) -> Values:
     """The form's values for ``spec``; raises ValueError where the form cannot show it."""
     values: Values = {"model": str(spec.get("model")), "/name": "", "asks": "goal" if "goal" in spec else "axes"}

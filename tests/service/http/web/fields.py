@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from playwright.sync_api import Page
+
+from sprag_study.service.http.web.form.spec import form_with_spec
 
 _OPEN = """name => {
   const outer = (element) => element?.closest("details");
@@ -29,3 +32,8 @@ def fill(page: Page, fields: dict[str, str]) -> None:
 def wrong(page: Page, name: str) -> Any:
     """What is said to be wrong beside a field."""
     return page.locator(f'[id="wrong:{name}"]')
+
+
+def field_of(pointer: str, values: Mapping[str, str]) -> str:
+    """The field beside which a fault at ``pointer`` of the spec is shown; "" for the whole form."""
+    return form_with_spec(values)[1].field_of(pointer)

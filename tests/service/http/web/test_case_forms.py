@@ -10,10 +10,11 @@ import pytest
 from sprag_study.service.http.web.form.check import check_form
 from sprag_study.service.http.web.form.page import empty
 from sprag_study.service.http.web.form.parts import reshape
-from sprag_study.service.http.web.form.spec import field_of, spec_of, values_of
+from sprag_study.service.http.web.form.spec import spec_of, values_of
 from sprag_study.service.spec.document import parse_spec
 from sprag_study.worker.chunking import Chunking
 from tests.service.conftest import Service
+from tests.service.http.web.fields import field_of
 from tests.service.spec_sample import changed
 
 SAMPLE: dict[str, Any] = {

@@ -18,7 +18,7 @@ from sprag_study.service.http.web.form.check import check_form, check_text
 from sprag_study.service.http.web.form.entries import plain
 from sprag_study.service.http.web.form.page import empty
 from sprag_study.service.http.web.form.parts import reshape, share
-from sprag_study.service.http.web.form.spec import field_of, spec_of, values_of
+from sprag_study.service.http.web.form.spec import spec_of, values_of
 from sprag_study.service.http.web.templates import duration, fragment, time_left
 from sprag_study.service.presets import preset_names, preset_text
 from sprag_study.service.reading.faults import message
@@ -29,6 +29,7 @@ from sprag_study.service.views.trajectory import PhasesView, TrajectoryView
 from sprag_study.worker import models
 from sprag_study.worker.chunking import Chunking
 from sprag_study.worker.study import Study
+from tests.service.http.web.fields import field_of
 from tests.service.spec_sample import changed
 
 EMPTY_FORM = empty("vibration-drive")

@@ -12,7 +12,7 @@ from sprag_study.service.http.web.form.goal import with_own_units, with_shown_un
 from sprag_study.service.http.web.form.page import empty
 from sprag_study.service.http.web.form.parts import reshape
 from sprag_study.service.http.web.form.sent import settle
-from sprag_study.service.http.web.form.spec import field_of, spec_of, values_of
+from sprag_study.service.http.web.form.spec import spec_of, values_of
 from sprag_study.service.presets import preset_text
 from sprag_study.service.reading.quantities import Units
 from sprag_study.service.reading.reader import Reading
@@ -21,6 +21,7 @@ from sprag_study.worker.chunking import Chunking
 from sprag_study.worker.models import SHARE
 from tests.service.conftest import Service
 from tests.service.http.web.controls import Controls
+from tests.service.http.web.fields import field_of
 
 GOAL: dict[str, Any] = {
     "vary": [

@@ -10,10 +10,11 @@ from sprag_study.service.http.views import preset_of
 from sprag_study.service.http.web.form.check import check_form
 from sprag_study.service.http.web.form.page import empty
 from sprag_study.service.http.web.form.parts import reshape
-from sprag_study.service.http.web.form.spec import field_of, spec_of, values_of
+from sprag_study.service.http.web.form.spec import spec_of, values_of
 from sprag_study.service.presets import preset_names
 from sprag_study.service.spec.document import parse_spec
 from sprag_study.worker.chunking import Chunking
+from tests.service.http.web.fields import field_of
 
 SHAFTS = [name for name in preset_names() if preset_of(name)["spec"]["model"] == "machine-shaft"]
 PRESS: dict[str, Any] = preset_of("press")["spec"]

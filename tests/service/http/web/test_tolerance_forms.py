@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 import pytest
 
 from sprag_study.service.http.web.form.parts import reshape
-from sprag_study.service.http.web.form.spec import field_of, spec_of, values_of
+from sprag_study.service.http.web.form.spec import spec_of, values_of
 from sprag_study.service.presets import preset_text
 from sprag_study.service.spec.document import load_spec, parse_spec
 from sprag_study.service.spec.report import SpecError
+from tests.service.http.web.fields import field_of
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service
