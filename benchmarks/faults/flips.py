@@ -2,7 +2,7 @@
 
 Each flip is made in a copy of the database of two finished studies, with the service stopped. Then the program opens
 the copy, checks it as `sprag admin db check` does, and reads every row, the specs, the parameters of the cases, and
-the numbers of cases by ending, regime and flag. A flip is silent if any of this differs and the program reports nothing.
+the numbers of cases by ending, regime and flag. A flip is silent if any of this differs and nothing reports it.
 Names, states, times and reasons of studies, which the digests do not cover, are counted apart.
 """
 
