@@ -9,6 +9,8 @@ import re
 from collections.abc import Iterable, Iterator
 from typing import Final
 
+#: A cell can hold a whole spec; csv takes 131,072 characters unless told otherwise.
+csv.field_size_limit(2**27)
 _NUMBER: Final = re.compile(r"-?\d+\.\d+(?:e[+-]?\d+)?", re.IGNORECASE)
 
 
@@ -26,7 +28,6 @@ class DecimalCommas:
         if not lines:
             return b""
         out = io.StringIO()
-        csv.field_size_limit(max(csv.field_size_limit(), len(lines)))  # of one cell: a whole spec, for instance
         rows = csv.reader(io.StringIO(lines.decode("utf-8"), newline=""))
         csv.writer(out, delimiter=";", lineterminator="\n").writerows(map(_with_commas, rows))
         mark, self._mark = self._mark, b""

@@ -83,7 +83,7 @@ from sprag_study.service.jobs.reports.reporter import Reporter
 from sprag_study.service.jobs.reports.watchdog import Watchdog, late_runs
 from sprag_study.service.schedules.fields import CHANGE as SCHEDULE_CHANGE
 from sprag_study.service.schedules.fields import SCHEDULE
-from sprag_study.service.settings import Settings, UnsafeSettingsError
+from sprag_study.service.settings import Settings, UnsafeSettingsError, effective
 from sprag_study.service.spec import components as component_spec
 from sprag_study.service.spec import labels
 from sprag_study.service.spec import saved_views as view_spec
@@ -294,6 +294,7 @@ def create_app(
         used_writer,
         Library(used_store),
         check_shares=Shares(max(settings.check_processes - 1, 1), MAX_CHECKS_EACH, MAX_CHECKS),
+        origins=tuple(effective(settings)),
     )
     queues = (
         Queue("checks", context.check_shares),

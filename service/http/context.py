@@ -16,7 +16,7 @@ from sprag_study.service.http.kept_files import KeptFiles
 from sprag_study.service.http.looks import Looks
 from sprag_study.service.http.problems import ApiError
 from sprag_study.service.http.shares import Shares
-from sprag_study.service.settings import Settings
+from sprag_study.service.settings import EffectiveSetting, Settings
 from sprag_study.service.storage.store import Store
 from sprag_study.service.views.library import Library
 from sprag_study.worker.limits import (
@@ -57,6 +57,7 @@ class Ready(Event):
 class Context:
     """Settings, store and computer of one service, and the ``files`` of ended studies.
 
+    ``origins`` are the settings with where each came from at the start.
     ``ending`` is set when the service begins to shut down.
     ``checker`` runs the functions that read, expand, fit or draw user input, and ``library`` gives them the store.
     ``writer`` writes files of rows, and ``sending`` are the places for rows that are sent meanwhile. Requests use all
@@ -82,6 +83,7 @@ class Context:
     looks: Looks = field(default_factory=Looks)
     sending: Semaphore = field(default_factory=lambda: Semaphore(SENDING_PROCESSES))
     files: KeptFiles = field(default_factory=KeptFiles)
+    origins: tuple[EffectiveSetting, ...] = ()
 
     def cut(self) -> None:
         """Stop computations and refuse writes; waiting requests are notified. Takes as long as killing the

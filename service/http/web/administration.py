@@ -15,10 +15,10 @@ from sprag_study.service.storage.people.people import Quota
 from sprag_study.service.storage.people.scopes import TokenScope, TokenState, token_name, user_name
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from sprag_study.service.http.context import Context
-    from sprag_study.service.storage.people.people import TokenRecord
+    from sprag_study.service.storage.people.people import TokenRecord, UserRecord
 
 #: For how long a renewed token still lets in, so that programs can be given the new one.
 GRACE: Final = timedelta(days=1)
@@ -41,12 +41,14 @@ def own_name() -> str | None:
     return None if grant is None else grant.user
 
 
-def listed_tokens(context: Context, owner: str | None = None) -> list[tuple[TokenRecord, TokenState]]:
-    """Every token, or those of one user, with its state."""
+def listed_tokens(
+    context: Context, owner: str | None = None, users: Sequence[UserRecord] | None = None
+) -> list[tuple[TokenRecord, TokenState]]:
+    """Every token, or those of one user, with its state; ``users`` where they are read already."""
     people = context.store.people
-    now, users = context.store.clock.now(), {user.name: user for user in people.users()}
+    now, known = context.store.clock.now(), {user.name: user for user in users or people.users()}
     return [
-        (token, token.state_at(now, users.get(token.owner or "")))
+        (token, token.state_at(now, known.get(token.owner or "")))
         for token in people.tokens()
         if owner is None or token.owner == owner
     ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import partial
 from threading import Lock
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -39,8 +40,8 @@ from sprag_study.service.languages import N_, _
 from sprag_study.service.reading.faults import message
 from sprag_study.service.reading.quantities import KINDS, SI, TYPED, WORKSHOP, read_units
 from sprag_study.service.reading.reader import CAPTIONS, CODES, Choice, told
-from sprag_study.service.settings import effective
-from sprag_study.service.storage.errors import TokenNotFoundError, UserNotFoundError
+from sprag_study.service.settings import DEFAULT_ORIGIN, HIDDEN, OPTION_ORIGIN
+from sprag_study.service.storage.errors import StoreError, TokenNotFoundError, UserNotFoundError
 from sprag_study.service.storage.people.audit import AuditPage, audit_filter
 from sprag_study.service.storage.people.scopes import MAX_USER_NAME
 from sprag_study.service.zones import is_zone, zones
@@ -68,6 +69,8 @@ _OF_ADMINISTRATORS: Final = {
     "/me/settings": N_("Settings"),
 }
 _LISTED: Final = 100
+#: Longest address in the audit log.
+_LONGEST: Final = 200
 #: Held while a test of reports is being sent.
 _TRIAL: Final = Lock()
 
@@ -176,7 +179,7 @@ def _users(context: Context, request: Request, chosen: str, status: int = 200, *
         users=[user_json(context.store.people, user) for user in listed],
         chosen=next((user for user in listed if user.name == chosen), None),
         roles=list(Role),
-        tokens=listed_tokens(context),
+        tokens=listed_tokens(context, users=listed),
         needed=access_of(request).needed,
         **shown,
     )
@@ -197,7 +200,8 @@ async def _changed(
     except TokenNotFoundError:
         faults = {"": _("There is no such token, or it is revoked, renewed or expired.")}
     else:
-        await access.refresh(changed=True)
+        with suppress(StoreError):  # the change is made; tokens are read again in two seconds at the latest
+            await access.refresh(changed=True)
         renewed = values.get("do") == "renew"
         return 200, {} if created is None else {"created": created, "renewed": renewed, "first": first}
     return 422, {"values": values, "faults": faults}
@@ -209,7 +213,7 @@ def _back(address: str) -> Response:
 
 @router.get("/me/settings")
 def settings(context: Ctx) -> Response:
-    """Every setting with its origin, and forms that send a test mail or a test webhook."""
+    """Every setting as at the start, with its origin, and forms that send a test mail or a test webhook."""
     return _settings(context, values={})
 
 
@@ -223,7 +227,7 @@ def try_reports(context: Ctx, values: Form) -> Response:
         shown = {"problem": _("Another test is being sent: try again when it has come to an end.")}
     else:
         try:
-            context.store.audit.note("report.test", to[:_LISTED], by=by)
+            context.store.audit.note("report.test", to[:_LONGEST], by=by)
             send(to, context.settings.reports, context.store.clock.now())
         except DeliveryError as error:
             shown = {"problem": told(str(error))}
@@ -235,8 +239,10 @@ def try_reports(context: Ctx, values: Form) -> Response:
 
 
 def _settings(context: Context, status: int = 200, **shown: Any) -> Response:
-    found = list(effective(context.settings))
-    return page("settings.html", status, parts=_parts(), part="/me/settings", settings=found, **shown)
+    marks = {"hidden": HIDDEN, "default": DEFAULT_ORIGIN, "option": OPTION_ORIGIN}
+    return page(
+        "settings.html", status, parts=_parts(), part="/me/settings", settings=context.origins, **marks, **shown
+    )
 
 
 @router.get("/me/workers")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from sprag_study.service.languages import N_
 from sprag_study.service.spec.described import FIT, Described, Listed, below
-from sprag_study.service.spec.machine.part import Choice
+from sprag_study.service.spec.machine.part import NO_LIMIT, Choice
 from sprag_study.service.spec.machine.shaft import SHAFT
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def drive_choices(study: Study, spec: Mapping[str, Any]) -> Iterator[Choice]:
             for name, field in FIT.items():
                 yield Choice(f"{place}.{name}", str(clutch.get(name, field.default)).lower(), field.help)
         elif clutch and f"{place}.windup_limit" not in (*study.base, *study.axis_paths):
-            yield Choice(f"{place}.windup_limit", "none", N_("largest windup; none: the law holds for any"))
+            yield Choice(f"{place}.windup_limit", NO_LIMIT, N_("largest windup; none: the law holds for any"))
 
 
 def shaft_choices(study: Study, _: Mapping[str, Any]) -> Iterator[Choice]:

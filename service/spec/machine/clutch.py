@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sprag_study.sentences import Sentence
+from sprag_study.service import languages
+from sprag_study.service.languages import gettext
 from sprag_study.service.reading.texts import quantity_text
 from sprag_study.service.spec.described import FIT, Listed, Record, Variants
 from sprag_study.service.spec.lists import read_list
+from sprag_study.service.spec.machine.part import NO_LIMIT
 from sprag_study.service.spec.report import Report, join
 from sprag_study.service.spec.schema.quantity import QUANTITY
 from sprag_study.worker import models
@@ -39,10 +43,18 @@ _ROWS = Listed(
     item={"type": "array", "minItems": 2, "maxItems": 2, "items": QUANTITY, "description": "angle and torque"},
 )  # fmt: skip
 _LAW = Record({"coefficients": _COEFFICIENTS, "windup_limit": CLUTCH_WINDUP_LIMIT}, required=("coefficients",))
-#: How pages print that the law has no limit, in each language.
-_NO_LIMIT: Final = ("none", "немає")
 MEASURED = Record({"data": _ROWS, "accuracy": _ACCURACY, **FIT}, required=("data", "accuracy"))
 CLUTCH = Variants((_LAW, MEASURED), "torque of the freewheel clutch over its windup", only=True)
+
+
+@cache
+def _no_limit() -> frozenset[str]:
+    """How pages print that the law has no limit, in each language."""
+    texts = set()
+    for code in languages.available():
+        with languages.language(code):
+            texts.add(gettext(NO_LIMIT))
+    return frozenset({NO_LIMIT, *texts})
 
 
 @dataclass(frozen=True)
@@ -109,7 +121,7 @@ def read_clutch(node: Node, prefix: str, backlashes: Sequence[float]) -> Clutch 
 
 def _given(node: Node, prefix: str) -> Clutch | None:
     limit: float | None = math.inf
-    if "windup_limit" in node and node["windup_limit"].value not in _NO_LIMIT:
+    if "windup_limit" in node and node["windup_limit"].value not in _no_limit():
         limit = node["windup_limit"].number(CLUTCH_WINDUP_LIMIT)
     items = _COEFFICIENTS.read(node["coefficients"])
     if items is None:

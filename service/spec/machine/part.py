@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
+from sprag_study.service.languages import N_
 from sprag_study.service.spec.described import Field, Record
 from sprag_study.service.spec.machine.machine import Machine
 from sprag_study.service.spec.run import refuse_run
@@ -18,6 +19,10 @@ if TYPE_CHECKING:
     from sprag_study.worker.study import Axis, Combine, Study
 
     Axes = tuple[Axis, ...]
+
+
+#: A windup limit that is none: as a choice of a clutch, and as pages print it.
+NO_LIMIT: Final = N_("none")
 
 
 class Choice(NamedTuple):

@@ -174,15 +174,13 @@ class People(Part):
             values["removed_at"] = sa.func.coalesce(_U.removed_at, self._now()) if removed else None
         with self.session.write() as connection:
             _require_standing(connection, self._now())
-            row, administers = None, (_U.role == Role.ADMINISTRATOR.value) & _U.removed_at.is_(None)
-            before = connection.execute(sa.select(_U.name).where(administers)).scalars().all()
+            row, before = None, acting().door is Door.PAGE and _is_administered(connection)
             if values:
                 change = sa.update(USERS).where(_U.name == name).values(values).returning(USERS)
                 row = connection.execute(change).one_or_none()
             if row is None:
                 raise UserNotFoundError(name)
-            left = connection.execute(sa.select(_U.name).where(administers)).first()
-            if acting().door is Door.PAGE and before and left is None:
+            if before and not _is_administered(connection):
                 raise parameter_error("role", "conflict", N_("is that of the last administrator"), name)
             action = "user.change" if removed is None else "user.remove" if removed else "user.restore"
             said = {} if role is None else {"role": role.value}
@@ -341,8 +339,14 @@ def require_user(connection: sa.Connection, name: str, *, removed: bool = False)
         raise UserNotFoundError(name)
 
 
+def _is_administered(connection: sa.Connection) -> bool:
+    """Whether any user is an administrator."""
+    administers = (_U.role == Role.ADMINISTRATOR.value) & _U.removed_at.is_(None)
+    return connection.execute(sa.select(_U.name).where(administers)).first() is not None
+
+
 def _require_standing(connection: sa.Connection, now: int) -> None:
-    """Raise FaultError where who acts on a page was removed, revoked or given another role since the page was asked.
+    """Raise FaultError where who acts on a page was removed or revoked meanwhile, or is no longer an administrator.
 
     A service reads users and tokens anew every two seconds; what it read must not decide who may let people in.
     """

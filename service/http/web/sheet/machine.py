@@ -20,6 +20,7 @@ from sprag_study.service.reading.reader import joined
 from sprag_study.service.reading.wording import number, unit_text
 from sprag_study.service.results.headlines.headline import DIMENSION_DIGITS
 from sprag_study.service.results.selection import with_tolerance
+from sprag_study.service.spec.fields import base_pointer
 from sprag_study.worker import models
 from sprag_study.worker.models.formulas import evaluate
 
@@ -52,7 +53,7 @@ def machine_of(
     form = models.model_of(study.model).presentation.form
     seen = {item.path: item.origin != "default" for item in inputs(study, spec)
             if item.path in study.base and form.in_sight(item.path)}  # fmt: skip
-    links = {path: f"{variant}#/base/{path.replace('.', '/')}" for path in seen}
+    links = {path: f"{variant}#{base_pointer(path)}" for path in seen}
     found = []
     for drawing in drawings(shown):
         labels = {each.path: _label(shown, reading, each.path, best, ends) for each in drawing.dimensions}

@@ -17,7 +17,8 @@ from pydantic import SecretStr
 from sprag_study.service.actor import Door, Role, act_as, of_machine
 from sprag_study.service.delivery import origin_of
 from sprag_study.service.faults import FaultError
-from sprag_study.service.storage.errors import TokenNotFoundError
+from sprag_study.service.http.access import Access
+from sprag_study.service.storage.errors import StoreError, TokenNotFoundError
 from sprag_study.service.storage.people.people import Quota, UserRecord
 from sprag_study.service.storage.people.scopes import TokenScope, TokenState
 from tests.service.http.people import OWN, Office
@@ -197,6 +198,31 @@ def test_where_nobody_administers_users_are_changed_all_the_same(service: Servic
         assert store.people.change_user("ann", Role.ADMINISTRATOR, removed=False).removed_at is None
         with pytest.raises(FaultError, match="last administrator"):
             store.people.change_user("ann", Role.VIEWER)
+
+
+def test_a_removed_user_is_restored_before_a_change(office: Office) -> None:
+    ada = office.program("ada")
+    assert ada.post("/me/users", data=user("vera", "remove"), headers=OWN).status_code == 303
+    answer = ada.post("/me/users", data=user("vera", "change"), headers=OWN)
+    assert answer.status_code == 422
+    assert "is removed: restore this user first" in answer.text
+
+
+def test_a_new_token_is_shown_though_tokens_cannot_be_read_again(
+    office: Office, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def fails(*_: object, **__: object) -> None:
+        raise StoreError("the database is locked")
+
+    dora = office.program("dora")
+    assert dora.get("/me").status_code == 200
+    monkeypatch.setattr(Access, "refresh", lambda self, changed=False: fails() if changed else nothing())
+    answer = dora.post("/me/tokens", data={"do": "create", "name": "x", "scope": "read"}, headers=OWN)
+    assert (answer.status_code, len(SECRET.findall(answer.text))) == (200, 1)
+
+
+async def nothing() -> None:
+    """Read nothing."""
 
 
 @pytest.mark.parametrize(
