@@ -143,12 +143,12 @@ class Here(Connection, ABC):
     def _content(self, study_id: str, part: str, query: Query) -> Iterable[bytes]:
         """What lies at an address, as JSON unless the query has another ``format``."""
         given = dict(query)
-        decimal = choice_of("decimal", given.pop("decimal", "point"), DECIMALS)
+        decimal = choice_of("decimal", given.get("decimal", "point"), DECIMALS)
         if decimal == "point":
             return self._answer(study_id, part, query)
         if given.get("format") != "csv":
             raise parameter_error("decimal", "not-used", "only CSV has it", decimal, "in csv")
-        return with_commas(self._answer(study_id, part, list(given.items())))
+        return with_commas(self._answer(study_id, part, [item for item in query if item[0] != "decimal"]))
 
     def _answer(self, study_id: str, part: str, query: Query) -> Iterable[bytes]:
         given, library = dict(query), self.library

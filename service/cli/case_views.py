@@ -63,7 +63,7 @@ def command(about: ViewInfo) -> Callable[..., None]:
         if is_study(spec):
             from sprag_study.service.client.wire import case_path
 
-            _refuse_local(every=every, points_file=points_file, tables=tables)
+            refuse_local(every=every, points_file=points_file, tables=tables)
             query = [*query_of(asked, settings), *([] if start is None else [("start", str(start))]), *drawing]
             with connection() as client:
                 path = case_path(study_of(client, spec), case, f"/{about.name}")
@@ -112,13 +112,15 @@ def require_language(drawing: Mapping[str, str]) -> None:
     choice_of("language", drawing.get("language", languages.ENGLISH), languages.available())
 
 
-def _refuse_local(**given: Any) -> None:
+def refuse_local(**given: Any) -> None:
     """Refuse what only a spec has; WrongInputError."""
     options = {"every": "--all", "points_file": "--points", "tables": "--file"}
     for name, value in given.items():
-        if value:
+        if value is not None and value not in (False, [], ()):
             reason = N_("belongs to a spec that is run here, not to a study of a service")
-            raise wrong_option(options[name], "not-used", reason, value if isinstance(value, str) else None)
+            raise wrong_option(
+                options.get(name, f"--{name}"), "not-used", reason, value if isinstance(value, str) else None
+            )
 
 
 def is_study(spec: str) -> bool:

@@ -47,7 +47,8 @@ def address() -> tuple[str, str | None]:
         return kept["server"], given.token or kept.get("token", "")
     server = named or DEFAULT_SERVER
     token = given.token or os.environ.get("SPRAG_TOKEN")
-    return server, token or (kept.get("token") if server == kept.get("server") else None)
+    of_login = server.rstrip("/") == kept.get("server", "").rstrip("/")
+    return server, token or (kept.get("token") if of_login else None)
 
 
 def profile_file() -> Path:

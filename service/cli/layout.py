@@ -48,13 +48,13 @@ def width_of(widths: Sequence[int]) -> int:
     return _ENDS + sum(width + _PADDING for width in widths) + _BETWEEN * (len(widths) - 1)
 
 
-def blocks(shapes: Sequence[Shape], width: int | None) -> list[dict[int, int]]:
+def blocks(shapes: Sequence[Shape], width: int) -> list[dict[int, int]]:
     """The columns of each table into which one is broken so that it fits ``width``, with their widths.
 
-    Every table begins with the first column. None for ``width`` is no limit.
+    Every table begins with the first column.
     """
     natural = {index: shape.natural for index, shape in enumerate(shapes)}
-    if width is None or width_of([*natural.values()]) <= width:
+    if width_of([*natural.values()]) <= width:
         return [natural]
     first, *others = (shape.least for shape in shapes)
     if width_of([first, max(others, default=0)]) > width:

@@ -49,8 +49,9 @@ def _of_case(words: Sequence[str]) -> list[str]:
     part = next((word for word in words if word in _VIEWS), "")
     rest = iter(words)
     for word in rest:
-        if word == "--set":
-            name, equals, value = next(rest, "").partition("=")
+        if word == "--set" or word.startswith("--set="):
+            setting = word.removeprefix("--set=") if word != "--set" else next(rest, "")
+            name, equals, value = setting.partition("=")
             option = _OPTIONS.get((part, name.strip()), name.strip().replace("_", "-"))
             options.append(f"--{option}{equals}{value.strip()}")
         elif word.startswith("-"):

@@ -49,10 +49,6 @@ TableFiles = Annotated[
 OutputFile = Annotated[
     str | None, typer.Option("-o", "--output", metavar="FILE", help="File to write; default: standard output.")
 ]
-TableOrPicture = Annotated[
-    str | None,
-    typer.Option("-o", "--output", metavar="FILE", help="Table or picture to write: .csv, .svg, .png or .pdf."),
-]
 CsvHeader = Annotated[
     Header | None,
     typer.Option(
@@ -91,23 +87,6 @@ StudyId = Annotated[
         help="Id or name of the study, or the beginning of one; latest: the newest.",
         autocompletion=completion.studies,
     ),
-]
-OfEnding = Annotated[
-    str | None,
-    typer.Option("--ending", metavar="ENDING", help="Only cases with this ending.", autocompletion=completion.endings),
-]
-OfRegime = Annotated[
-    str | None,
-    typer.Option(
-        "--regime",
-        metavar="REGIME",
-        help="Only cases of this regime, of a settled study.",
-        autocompletion=completion.regimes,
-    ),
-]
-OfFlag = Annotated[
-    str | None,
-    typer.Option("--flag", metavar="FLAG", help="Only cases with this flag.", autocompletion=completion.flags),
 ]
 CurveBy = Annotated[
     list[str] | None,

@@ -16,7 +16,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, cast
 import typer
 
 from sprag_study.service import languages
-from sprag_study.service.cli.case_views import SpecOrStudy, is_study, naming_options, require_language, say_file
+from sprag_study.service.cli.case_views import (
+    SpecOrStudy,
+    is_study,
+    naming_options,
+    refuse_local,
+    require_language,
+    say_file,
+)
 from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.configured import read_settings
 from sprag_study.service.cli.console import WrongInputError, say, warning_lines, write_json, wrong_option
@@ -113,6 +120,7 @@ def _made(command: Command) -> Callable[..., None]:
             whole = {**settings, "limit": most}
         drawing = dict([*in_units(units), *in_language(language)])
         if is_study(study):
+            refuse_local(measured=measured, db=db, processes=processes)
             opened = _remote(study, about, asked, drawing)
         else:
             if db is not None:

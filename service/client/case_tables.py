@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from numbers import Real
 from typing import Any, Final
 
@@ -41,7 +41,7 @@ def points_of(cases: object, argument: str) -> str:
     filled = {name: cells if isinstance(cells, list) else [cells] * length for name, cells in read.items()}
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(_heading(name, units.get(name, ""), cells) for name, cells in filled.items())
+    writer.writerow(_heading(name, units.get(name, "")) for name in filled)
     writer.writerows(zip(*filled.values(), strict=True))
     return text.getvalue()
 
@@ -75,7 +75,6 @@ def _cells(column: Any, argument: str, name: str) -> Any:
     return cells
 
 
-def _heading(name: str, unit: str, cells: Sequence[object]) -> str:
-    """The heading of a column, with the unit of its numbers; texts have their own."""
-    bare = unit in _UNITLESS or any(isinstance(cell, str) for cell in cells)
-    return name if bare else f"{name} [{unit}]"
+def _heading(name: str, unit: str) -> str:
+    """The heading of a column, with the unit of its bare numbers."""
+    return name if unit in _UNITLESS else f"{name} [{unit}]"

@@ -25,7 +25,7 @@ Entries: TypeAlias = Mapping[str, Any] | Sequence[Mapping[str, Any]]
 #: Results: one, several, conditions such as "torque.max <= 3 N*m", or a mapping of each to "min" or "max".
 Results: TypeAlias = str | Mapping[str, Any] | Sequence[str | Mapping[str, Any]]
 
-_CONDITION: Final = re.compile(r"(\S+)\s*(<=|>=|=)\s*(.+)")
+_CONDITION: Final = re.compile(r"([^\s<>=]+)\s*(<=|>=|=)\s*(.+)")
 _RELATIONS: Final = {"<=": "at_most", ">=": "at_least", "=": "is"}
 
 
@@ -116,7 +116,10 @@ class Draft(Mapping[str, Any]):
         return draft
 
     def path(self, name: str) -> str:
-        """The path of a parameter; ArgumentError for a name that no parameter of the machine has, or several."""
+        """The path of a parameter; ArgumentError for a name that no parameter of the machine has, or several.
+
+        A whole path, with its points, is taken as it is: what reads the spec refuses one that the model lacks.
+        """
         text = name.replace("__", ".")
         if "." in text:
             return text
@@ -134,8 +137,15 @@ class Draft(Mapping[str, Any]):
         return axes
 
     def _without(self, path: str) -> list[Any]:
-        """The axes along which a parameter does not vary."""
-        return [axis for axis in self._axes() if path not in _paths(axis)]
+        """The axes without a parameter; those that it shares with others are theirs alone."""
+        axes = []
+        for axis in self._axes():
+            paths = [other for other in _paths(axis) if other != path]
+            if paths == _paths(axis):
+                axes.append(axis)
+            elif paths:
+                axes.append({**axis, "path": paths if len(paths) > 1 else paths[0]})
+        return axes
 
     def _entries(self, entries: Entries | None, alone: str) -> list[dict[str, Any]] | None:
         """The objects that belong to paths: of a mapping, in which a pair is a range and another value ``alone``."""

@@ -85,6 +85,19 @@ def test_a_name_that_is_none_or_several_is_refused(name: str, allowed: str) -> N
         drive(2).vary({name: [1.0]})
 
 
+def test_a_condition_needs_no_blanks() -> None:
+    best = {"shaft.speed.mean": "max"}
+    spec = drive().goal(vary={"frequency": ("20 Hz", "35 Hz")}, best=best, subject_to=["torque.max<=3 N*m"])
+    assert spec["goal"]["subject_to"] == [{"result": "torque.max", "at_most": "3 N*m"}]
+
+
+def test_what_is_held_leaves_a_shared_axis_to_the_others() -> None:
+    draft = sprag.Drive.of("one_pendulum").hold(amplitude_x="1 mm")
+    (axis,) = (axis for axis in draft["axes"] if axis["path"] == "excitation.amplitude_y")
+    assert len(axis["values"]) > 1
+    assert draft["base"]["excitation"]["amplitude_x"] == "1 mm"
+
+
 def test_a_part_that_is_not_there_is_refused() -> None:
     with pytest.raises(ArgumentError, match="a place from 0 to 0"):
         drive(1).hold({"pendulums.1.mass": "0.4 kg"})
