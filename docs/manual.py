@@ -19,7 +19,7 @@ VERSION: Final = tomllib.loads((FOLDER.parents[1] / "pyproject.toml").read_text(
 
 
 def pages() -> dict[str, str]:
-    """The text of every page by the name of its file: sprag.1, sprag-run.1, sprag-db-upgrade.1, ..."""
+    """The text of every page by the name of its file: sprag.1, sprag-run.1, sprag-admin-db-upgrade.1, ..."""
     root = command_line()
     return {f"{name}.1": "\n".join(lines) + "\n" for name, lines in _pages(root, None, "sprag")}
 

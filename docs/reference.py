@@ -45,7 +45,9 @@ def commands(command: object | None = None, name: str = "") -> Iterator[Row]:
 
 def _sentence(text: str) -> str:
     """The first paragraph, its options as code."""
-    return re.sub(r"(--[a-z-]+)", r"`\1`", " ".join(text.partition("\n\n")[0].split()))
+    return re.sub(
+        r"(`[^`]*`)|(--[a-z-]+)", lambda found: found[1] or f"`{found[2]}`", " ".join(text.partition("\n\n")[0].split())
+    )
 
 
 def operations() -> Iterator[Row]:

@@ -1,4 +1,4 @@
-"""The way up for databases of earlier revisions, which `sprag db upgrade` goes.
+"""The way up for databases of earlier revisions, which `sprag admin db upgrade` goes.
 
 A new database is made from the description of the tables (`sprag_study.service.storage.tables`). An earlier one gets
 whatever tables, columns and indexes that description has and the database lacks; so a revision that only adds needs

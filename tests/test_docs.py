@@ -65,6 +65,8 @@ def named(words: list[str]) -> str:
         path.append(known[0].strip(",."))
         words.remove(known[0])
         tree = tree.commands[path[-1]]
+    of_group = path and hasattr(tree, "commands") and words and words[0].islower()
+    assert not of_group, f"sprag {' '.join([*path, *words])}"
     return " ".join(path) or words[0]
 
 

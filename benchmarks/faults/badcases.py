@@ -14,8 +14,8 @@ from benchmarks.faults import harness
 
 #: Periods of all cases together that this process computes in half a minute or so.
 _WHOLE_PERIODS = 5_000_000
-#: Loads of a study that has the kernel loaded, and no process compile within the limit of a bad case: none of them is
-#: one of the drill's, whose bad cases would be bad here too.
+#: Loads of a study that runs first, so that no process compiles within the limit of a bad case. None is a load of the
+#: drill, whose bad cases would be bad here too.
 _FIRST = {"axes": [{"path": "shaft.load", "linspace": [0.0123, 0.4567, 16]}]}
 _SECONDS = "SELECT (finished_at - started_at) / 1e6 FROM studies WHERE id = ?"
 

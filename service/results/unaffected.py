@@ -108,7 +108,5 @@ def _changes(groups: Sequence[Ints], names: Sequence[str], fetch: Fetch) -> bool
 
 
 def unaffecting(store: Store, record: StudyRecord) -> tuple[str, ...]:
-    """The sentences about the axes of a stored study; none before its end."""
-    if not record.state.terminal or not record.done:
-        return ()
+    """The sentences about the axes of a stored study that has ended with rows."""
     return unaffected(store.studies.study(record.id), partial(store.rows.for_cases, record.id))

@@ -111,8 +111,16 @@ _TOLD: Final = 512
 _LISTED: Final = 2000
 #: Ended studies of which it is kept which axes change nothing.
 _UNAFFECTED: Final = 256
-#: Answers that are kept with their curves, for what one page shows of them.
-_ANSWERS: Final = 8
+#: Numbers of answers that are kept with their curves, for what one page shows of them: some 16 MB.
+_ANSWERS: Final = 2_000_000
+
+
+def _numbers(answers: StudyAnswers) -> int:
+    """How many numbers the curves of answers have, roughly."""
+    if answers.drawn is None:
+        return 1_000
+    chosen = answers.drawn.selection
+    return 1_000 + len(answers.drawn.curves) * len(chosen.x_values) * len(chosen.results)
 
 
 def reading_of(store: Store, study_id: str, choice: Choice) -> Reading:
@@ -137,13 +145,15 @@ class Library:
         #: Headlines by study, its revision, and the question.
         self.told: Kept[tuple[object, ...], Headline] = Kept(LRUCache(_TOLD))
         #: Answers of curves by study, its revision, and the question.
-        self.answers: Kept[tuple[object, ...], StudyAnswers] = Kept(LRUCache(_ANSWERS))
+        self.answers: Kept[tuple[object, ...], StudyAnswers] = Kept(LRUCache(_ANSWERS, getsizeof=_numbers))
         self._unaffected: Kept[tuple[str, int], tuple[str, ...]] = Kept(LRUCache(_UNAFFECTED))
         #: Of listed studies the revision, and headline and description where they have them (`views.listed`).
         self.headlines: Kept[str, tuple[int, tuple[Headline, Phrase] | None]] = Kept(LRUCache(_LISTED))
 
     def unaffected(self, record: StudyRecord) -> tuple[str, ...]:
         """The sentences about axes of a study that change no result; none before its end."""
+        if not record.state.terminal or not record.done:  # else each poll would take the place of an ended study
+            return ()
         return self._unaffected.of((record.id, record.revision), lambda: unaffecting(self.store, record))
 
     def __reduce__(self) -> tuple[Callable[[str, Chunking], Library], tuple[str, Chunking]]:

@@ -88,7 +88,10 @@ def named_curves(
 
 
 def clearest(places: Sequence[Box], lines: Sequence[Numbers], taken: Sequence[Box]) -> Box:
-    """The first place that touches neither a line (by its points) nor what is taken; the freest where none does."""
+    """The first place that touches neither a line (by its points) nor what is taken, or the one farthest from lines.
+
+    Where all are taken it is the last.
+    """
     free = [box for box in places if not any(box.touches(other) for other in taken)] or [places[-1]]
     points = np.concatenate([*lines, np.empty((0, 2))])
     clear = [distance(box, points) for box in free]
