@@ -90,14 +90,14 @@ def _version(package: str) -> str:
 
 
 @cache
-def own() -> Mapping[str, str]:
+def present() -> Mapping[str, str]:
     """The fingerprint of this process, cached at the first call; `collect` computes it anew."""
     return collect()
 
 
 def digest() -> str:
     """SHA-256 (hexadecimal) of `own`."""
-    return digest_of(own())
+    return digest_of(present())
 
 
 def digest_of(fingerprint: Mapping[str, str]) -> str:

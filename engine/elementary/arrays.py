@@ -44,7 +44,7 @@ def _loops() -> ModuleType:
     return loops
 
 
-def _one(function: int) -> Callable[[ArrayLike], Floats]:
+def _of_one(function: int) -> Callable[[ArrayLike], Floats]:
     def apply(x: ArrayLike) -> Floats:
         values = np.array(x, dtype=np.float64, order="C")
         if _loops().of_one(function, values.reshape(-1)):
@@ -96,10 +96,10 @@ def _turn() -> int:
     return 8 * (4 * inverse_arctangent(5) - inverse_arctangent(239)) >> 32
 
 
-sin, cos, tan = map(_one, (SIN, COS, TAN))
-arcsin, arccos, arctan, arctan2 = _one(ARCSIN), _one(ARCCOS), _one(ARCTAN), _two(ARCTAN2)
-exp, log = _one(EXP), _one(LOG)
-sinh, cosh, tanh = map(_one, (SINH, COSH, TANH))
+sin, cos, tan = map(_of_one, (SIN, COS, TAN))
+arcsin, arccos, arctan, arctan2 = _of_one(ARCSIN), _of_one(ARCCOS), _of_one(ARCTAN), _two(ARCTAN2)
+exp, log = _of_one(EXP), _of_one(LOG)
+sinh, cosh, tanh = map(_of_one, (SINH, COSH, TANH))
 _power = _two(POWER)
 _SIMPLE: Final[dict[float, Callable[[Floats], Floats]]] = {
     2.0: np.square,

@@ -91,18 +91,18 @@ def trajectory(model: MachineSpec, columns: Mapping[str, ArrayLike], angles: Arr
         raise ValueError(f"angles must be within 0 .. {cycle:g} rad")
     row = Columns.of(model, columns, 1)
 
-    def made(angles: Floats, values: Floats, ending: Ending, phi_c: tuple[float, ...] = ()) -> Trajectory:
+    def trajectory(angles: Floats, values: Floats, ending: Ending, phi_c: tuple[float, ...] = ()) -> Trajectory:
         return Trajectory(angles, names, units, values, {}, ending, "angle", "rad", phi_c)
 
     nothing = np.empty((0, len(names)))
     if not np.isnan(Machine(model, row).unassembled()[0]):
-        return made(nothing[:, 0], nothing, Ending.CANNOT_ASSEMBLE)
+        return trajectory(nothing[:, 0], nothing, Ending.CANNOT_ASSEMBLE)
     with np.errstate(all="ignore"):
         *_, (_, solved) = attempts(model, row)
         settle(model, row, solved)
     ending = ENDINGS[int(solved.endings[0])]
     if ending is not Ending.OK:
-        return made(nothing[:, 0], nothing, ending)
+        return trajectory(nothing[:, 0], nothing, ending)
     table = _table(solved.decomposition, model.phi_c, np.minimum(asked, cycle))
     machine, places = Machine(model, row), np.minimum(asked, cycle)
     if model.parts:
@@ -110,7 +110,7 @@ def trajectory(model: MachineSpec, columns: Mapping[str, ArrayLike], angles: Arr
     table |= _joint_table(machine, solved, places)
     values = np.column_stack([table[name] for name in names])
     every = np.sort(np.mod(solved.decomposition.crossings.angle, cycle))
-    return made(asked, values, ending, tuple(float(angle) for angle in every))
+    return trajectory(asked, values, ending, tuple(float(angle) for angle in every))
 
 
 def _table(d: Decomposition, chosen: int | None, angles: Floats) -> dict[str, Floats]:

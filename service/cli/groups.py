@@ -39,7 +39,7 @@ class LazyCommands(Mapping[str, Any]):
         if name not in self._loaded:
             word = self.words[name]
             module, _, attribute = word.place.partition(":")
-            self._loaded[name] = made(name, getattr(import_module(f"{__package__}.{module}"), attribute))
+            self._loaded[name] = command_of(name, getattr(import_module(f"{__package__}.{module}"), attribute))
             self._finish(self._loaded[name])
         return self._loaded[name]
 
@@ -52,7 +52,7 @@ class LazyCommands(Mapping[str, Any]):
         return len(self.words)
 
 
-def made(name: str, source: Callable[..., None] | typer.Typer) -> Any:
+def command_of(name: str, source: Callable[..., None] | typer.Typer) -> Any:
     """The command of a function, or the group of an application of typer."""
     if isinstance(source, typer.Typer):
         group = get_group_from_info(

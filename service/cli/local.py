@@ -229,9 +229,9 @@ def run(
         study_id = record.id if db is not None else None
         write_json({"file": file, "study": study_id, **numbers, "endings": endings, "seconds": round(seconds, 3)})
     if record.time_over:
-        from sprag_study.service.reading.reader import told
+        from sprag_study.service.reading.reader import shown_stored
 
-        say(told(record.reason or ""))
+        say(shown_stored(record.reason or ""))
     if record.ok != record.cases:
         raise typer.Exit(ExitCode.NOT_ALL_OK)
 

@@ -102,7 +102,7 @@ class _Source:
     model: Callable[[], str]
 
 
-def _made(command: Command) -> Callable[..., None]:
+def _function_of(command: Command) -> Callable[..., None]:
     about = command.about
     asked = settings_of(about.question)
 
@@ -207,7 +207,7 @@ def _local(
     from sprag_study.service.reading.reader import CAPTIONS, Choice, reading_for
     from sprag_study.service.views.library import Library
     from sprag_study.service.views.studies import STUDY_VIEWS
-    from sprag_study.service.views.study_view import StudyAnswer, found, is_drawn, written
+    from sprag_study.service.views.study_view import StudyAnswer, answer_of, is_drawn, written
 
     say(*warning_lines(parsed.warnings))
     view = STUDY_VIEWS[about.name]
@@ -219,18 +219,18 @@ def _local(
             view.check(parsed.study, view.choose(parsed.study, about.question(**first)))
     known: list[tuple[Any, bool, StudyAnswer[Any, Any]]] = []
 
-    def answer_of(settings: dict[str, Any], form: str) -> StudyAnswer[Any, Any]:
+    def answer_as(settings: dict[str, Any], form: str) -> StudyAnswer[Any, Any]:
         """The view, found once for all its forms where these have the same."""
         chosen, drawn = view.choose(study, about.question(**settings)), view.drawn_differs and is_drawn(form)
         for other, other_drawn, answer in known:
             if (chosen, drawn) == (other, other_drawn):
                 return answer
-        known.append((chosen, drawn, found(library, done.record.id, view, chosen, drawn=drawn)))
+        known.append((chosen, drawn, answer_of(library, done.record.id, view, chosen, drawn=drawn)))
         return known[-1][-1]
 
     def file_of(settings: dict[str, Any], form: str) -> bytes:
         with naming_options(study, asked, ""):
-            answer = answer_of(settings, form)
+            answer = answer_as(settings, form)
             with languages.language(drawing.get("language", languages.ENGLISH)):
                 return written(view, answer, choice, study.name or study.model, form)
 
@@ -245,4 +245,4 @@ def _local(
 
 
 #: The commands by name.
-COMMANDS: Final = {command.name: _made(command) for command in _COMMANDS}
+COMMANDS: Final = {command.name: _function_of(command) for command in _COMMANDS}

@@ -12,7 +12,7 @@ from sprag_study.service.figures.figure import Figure, Note, NoteKind, Panel
 from sprag_study.service.reading.reader import Phrase
 
 if TYPE_CHECKING:
-    from sprag_study.service.results.key_answers import Found, StudyAnswers
+    from sprag_study.service.results.key_answers import ReadAnswer, StudyAnswers
 
 
 def answers_figure(found: StudyAnswers, columns: int = 1, *, chosen: int | None = None) -> Figure:
@@ -47,6 +47,6 @@ def _notes(found: StudyAnswers, panel: Panel, name: str, marked: int | None) -> 
             yield Note(item.x, item.value, colour, kind, text, str(place))
 
 
-def _text(item: Found, x_unit: str) -> str:
+def _text(item: ReadAnswer, x_unit: str) -> str:
     """The extreme, and where it is."""
     return Phrase("{value} at {x}", value=Amount(item.value, item.unit, 3), x=Amount(item.x, x_unit, 3))

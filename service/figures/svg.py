@@ -398,9 +398,9 @@ def described(figure: Figure) -> str:
         ends = extent([line.y for line in panel.lines])
         if ends is not None:
             name = title_of(panel.y)
-            parts.append(gettext("{name} from {low} to {high}", name=name, low=_told(ends[0]), high=_told(ends[1])))
+            parts.append(gettext("{name} from {low} to {high}", name=name, low=_shown(ends[0]), high=_shown(ends[1])))
     return "; ".join(parts)
 
 
-def _told(value: float) -> str:
+def _shown(value: float) -> str:
     return tick_text(float(f"{value:.4g}"))

@@ -1,7 +1,7 @@
 """The role that each route needs. A route that is not listed here is for administrators only.
 
 Reading is for everybody who may use the service; what changes something is for designers, who can change their own
-and what has no owner (`sprag_study.service.storage.people.audit.require_own`).
+and what has no owner (`sprag_study.service.storage.people.audit.require_owner`).
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
 
@@ -216,17 +217,27 @@ def typed_units(study: Study, spec: Mapping[str, Any]) -> dict[str, str]:
     for si, text in _quantities(study, spec):
         if si == "1" and not isinstance(si, models.Share):
             continue
-        try:
-            number, own = split_quantity(text)
-            size = _size(own, si)
-        except QuantityError:
-            continue
-        # A unit that is not offered, or is the SI unit of another kind, could not be told from others in a picture.
-        offered = (si, *_BY_UNIT[si].others) if si in _BY_UNIT else ()
-        unit = next((unit for unit in offered if _size(unit, si) == size), None)
+        number, unit = _typed_unit(text, si)
         if unit is not None:
             votes.setdefault(si, Counter())[unit] += _MUCH if number else 1
     return {si: counter.most_common(1)[0][0] for si, counter in votes.items()}
+
+
+def typed_unit(text: str, si: str) -> str | None:
+    """The unit of those offered in which a quantity of the SI unit was typed; None where none is its size."""
+    return _typed_unit(text, si)[1]
+
+
+def _typed_unit(text: str, si: str) -> tuple[Fraction, str | None]:
+    """The number of a quantity, and its unit; an unknown unit, and text that is none, has no unit."""
+    try:
+        value, typed = split_quantity(text)
+        size = _size(typed, si)
+    except QuantityError:
+        return Fraction(), None
+    # A unit that is not offered, or is the SI unit of another kind, could not be told from others in a picture.
+    units = (si, *_BY_UNIT[si].others) if si in _BY_UNIT else ()
+    return value, next((unit for unit in units if _size(unit, si) == size), None)
 
 
 def units_in(base: object) -> dict[str, str]:

@@ -99,7 +99,7 @@ def shown(text: str) -> str:
     return said(text, None)
 
 
-def told(text: str) -> str:
+def shown_stored(text: str) -> str:
     """As `shown`; a text without values is found among those of earlier releases."""
     return shown(text) if isinstance(text, Sentence) else earlier.said(text)
 

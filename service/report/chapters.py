@@ -39,14 +39,13 @@ from sprag_study.worker.planning.calibrate.plan import CALIBRATE
 
 if TYPE_CHECKING:
     from sprag_study.service.report.content import Report
-    from sprag_study.service.report.office import Office
-    from sprag_study.service.results.key_answers import Found
-    from sprag_study.service.storage.studies.records import StudyRecord
+    from sprag_study.service.results.key_answers import ReadAnswer
     from sprag_study.worker.study import Study
 
 
-def facts_of(record: StudyRecord, study: Study, spec: Mapping[str, Any], office: Office) -> tuple[tuple[str, str], ...]:
-    """Names and values of a study; ``spec`` is the user's own."""
+def facts_of(report: Report) -> tuple[tuple[str, str], ...]:
+    """Names and values of a study, times on the clock of the office."""
+    record, office = report.record, report.office
     ended = record.finished_at
     counts = {"cases": number(record.cases), "done": number(record.done), "ok": number(record.ok)}
     return (
@@ -54,13 +53,13 @@ def facts_of(record: StudyRecord, study: Study, spec: Mapping[str, Any], office:
         (_("model"), model_title(record.model)),
         (_("state"), f"{_(record.state.value)}: {_(record.state.sentence)}"),
         (_("cases"), _("{cases}, of which {done} are done and {ok} ended ok", **counts)),
-        (_("axes"), _combined(study)),
+        (_("axes"), _combined(report.study)),
         (_("submitted"), office.moment(record.created_at)),
         (_("ended"), _("not yet") if ended is None else office.moment(ended)),
         (_("version of Sprag"), version("sprag-study")),
         (_("engine"), record.engine_version),
         (_("hash of the physics"), record.physics_hash),
-        (_("SHA-256 of the spec"), spec_hash(spec)),
+        (_("SHA-256 of the spec"), spec_hash(report.spec)),
     )
 
 
@@ -93,12 +92,12 @@ def chapters_of(report: Report) -> dict[str, str]:
     return {name: _(_CHAPTERS[name].title) for name in CHAPTERS if _CHAPTERS[name].has(report)}
 
 
-def appendix(report: Report, office: Office) -> Iterator[Section]:
+def appendix(report: Report) -> Iterator[Section]:
     """The chapters that are asked for, without those that have nothing to say."""
     names = report.question.appendix or ()
     for name, title in chapters_of(report).items():
         if name in names or "all" in names:
-            blocks = tuple(_CHAPTERS[name].blocks(report, office))
+            blocks = tuple(_CHAPTERS[name].write(report))
             if blocks:
                 yield Section(title, blocks)
 
@@ -125,7 +124,7 @@ def _answer_rows(report: Report) -> Iterator[tuple[str, ...]]:
         yield from dict.fromkeys(_answer_row(report, item) for item in (*one.answers, *one.working_point))
 
 
-def _answer_row(report: Report, item: Found) -> tuple[str, str, str, str]:
+def _answer_row(report: Report, item: ReadAnswer) -> tuple[str, str, str, str]:
     read, title, unit = report.reading, item.answer.title, "1" if report.answers is None else report.answers.unit
     title = read.say_name(title) if title == item.answer.result else said_title(title, read)
     sign = "> " if item.above and item.value is not None else ""
@@ -299,8 +298,8 @@ def _further(report: Report) -> Iterator[Block]:
         yield Text(_("A result that has the same value everywhere on these curves is in the table of ranges only."))
 
 
-def _facts(report: Report, office: Office) -> Iterator[Block]:
-    facts = [*facts_of(report.record, report.study, report.spec, office)]
+def _facts(report: Report) -> Iterator[Block]:
+    facts = [*facts_of(report)]
     if report.kinds.regimes:
         facts.append((_("motions"), shown(counted(report.kinds.regimes))))
     origins = "; ".join(origin.sentence for origin in report.library.store.rows.origins(report.study_id))
@@ -325,12 +324,8 @@ class _Chapter(NamedTuple):
     """A chapter: its title, what it has, and whether a study has it."""
 
     title: str
-    write: Callable[..., Iterator[Block]]
+    write: Callable[[Report], Iterator[Block]]
     has: Callable[[Report], object] = lambda _report: True
-
-    def blocks(self, report: Report, office: Office) -> Iterator[Block]:
-        """What it has; the one about the computation is in the time of an office."""
-        return self.write(report, office) if self.write is _facts else self.write(report)
 
 
 #: The further figures stand by themselves: they are chosen one by one.

@@ -40,9 +40,8 @@ from sprag_study.worker.planning.calibrate.plan import CALIBRATE
 from sprag_study.worker.planning.goals.plan import GOAL
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from sprag_study.service.figures.figure import Figure
+    from sprag_study.service.report.office import Office
     from sprag_study.service.results.calibration import Calibration
     from sprag_study.service.results.curves import CurveQuery, Fetch
     from sprag_study.service.results.fronts import Designs
@@ -82,14 +81,18 @@ class Range:
 class Report:
     """A study in its current state as a document shows it, in SI and code names; ``reading`` says how it is read.
 
-    ``question`` has the curves, the working point and what its author wrote. The figures that are saved with the study
-    for its report stand in the place of its curves, unless the question names results.
+    ``question`` has the curves, the working point and what its author wrote, ``office`` is whose document it is. The
+    figures that are saved with the study for its report stand in the place of its curves, unless the question names
+    results.
     """
 
-    def __init__(self, library: Library, study_id: str, choice: Choice, question: ReportQuestion) -> None:
+    def __init__(
+        self, library: Library, study_id: str, choice: Choice, question: ReportQuestion, office: Office
+    ) -> None:
         store = library.store
         store.digests.require_undamaged(study_id, anew=True)
-        self.library, self.study_id, self.choice, self.question = library, study_id, choice, question
+        self.library, self.study_id = library, study_id
+        self.choice, self.question, self.office = choice, question, office
         self.record, self.progress = store.studies.look(study_id)
         self.spec = store.studies.spec(study_id)
         self.study: Study = store.studies.study(study_id)

@@ -21,10 +21,7 @@ if TYPE_CHECKING:
     from datetime import datetime
 
     from sprag_study.service.reading.reader import Choice
-    from sprag_study.service.report.blocks import Document
-    from sprag_study.service.report.office import Office
     from sprag_study.service.views.library import Library
-    from sprag_study.service.views.study_questions import ReportQuestion
 
 #: Most characters of a text of the author.
 LONGEST_TEXT: Final = 2_000
@@ -33,7 +30,11 @@ NOBODY: Final = Office()
 
 
 def report_of(
-    library: Library, study_id: str, choice: Choice = AS_TYPED, question: ReportQuestion | None = None
+    library: Library,
+    study_id: str,
+    choice: Choice = AS_TYPED,
+    question: ReportQuestion | None = None,
+    office: Office = NOBODY,
 ) -> Report:
     """What a document shows of a stored study, by default of the question with no settings.
 
@@ -46,7 +47,7 @@ def report_of(
             raise refused("text", "too-long", "is too long", allowed=characters(0, LONGEST_TEXT))
     for name in asked.appendix or ():
         choice_of("appendix", name, ("all", *CHAPTERS))
-    return Report(library, study_id, choice, asked)
+    return Report(library, study_id, choice, asked, office)
 
 
 def document_of(
@@ -57,27 +58,32 @@ def document_of(
     office: Office = NOBODY,
 ) -> Document:
     """The document of a stored study; raises as `report_of` does."""
-    return made_document(report_of(library, study_id, choice, question), office)
+    return made_document(report_of(library, study_id, choice, question, office))
 
 
-def made_document(report: Report, office: Office = NOBODY, *, edited: bool = False) -> Document:
+def made_document(report: Report, *, edited: bool = False) -> Document:
     """The document of what is known of a study; one that is ``edited`` has a place for each text of the author."""
-    kept = (said(_without(section, edited=edited), report.reading) for section in sections_of(report, office))
+    ended = report.office.moment(_computed(report))
+    kept = (said(_without(section, edited=edited), report.reading) for section in sections_of(report))
     return Document(
         report.title,
-        tuple(title_block(report.question, office)),
+        tuple(title_block(report.question, report.office)),
         tuple(section for section in kept if section.blocks),
-        _("computed by Sprag {version}, {time}", version=version("sprag-study"), time=office.moment(_computed(report))),
+        _(
+            "computed by Sprag {version}, {time}",
+            version=version("sprag-study"),
+            time=ended,
+        ),
     )
 
 
-def sections_of(report: Report, office: Office = NOBODY) -> Iterator[Section]:
+def sections_of(report: Report) -> Iterator[Section]:
     """The sections of a document with sentences and amounts, which `said` prints."""
     yield from sheets(report)
     further = further_figures(report)
     if further is not None:
         yield further
-    yield from appendix(report, office)
+    yield from appendix(report)
 
 
 def _computed(report: Report) -> datetime:
@@ -119,5 +125,5 @@ class Shown:
 
 def shown_document(library: Library, study_id: str, choice: Choice, question: ReportQuestion, office: Office) -> Shown:
     """The document of a stored study with a place for each text of its author; raises as `document_of` does."""
-    report = report_of(library, study_id, choice, question)
-    return Shown(made_document(report, office, edited=True), chapters_of(report))
+    report = report_of(library, study_id, choice, question, office)
+    return Shown(made_document(report, edited=True), chapters_of(report))

@@ -19,7 +19,7 @@ from sprag_study.worker.directions import SWEEP, direction
 
 if TYPE_CHECKING:
     from sprag_study.service.reading.reader import Reading
-    from sprag_study.service.results.key_answers import CurveAnswers, Found, StudyAnswers
+    from sprag_study.service.results.key_answers import CurveAnswers, ReadAnswer, StudyAnswers
     from sprag_study.worker.study import Study
 
 _EXTREMES: Final = ("largest", "smallest")
@@ -112,13 +112,13 @@ def _curve(one: CurveAnswers, found: StudyAnswers) -> CurveAnswer:
     }
 
 
-def answer_json(found: Found, x_unit: str) -> AnswerValue:
+def answer_json(found: ReadAnswer, x_unit: str) -> AnswerValue:
     """One answer."""
     facts = answer_facts(found)
     return {**facts, "note": note_of(facts, x_unit)}
 
 
-def answer_facts(found: Found) -> AnswerFacts:
+def answer_facts(found: ReadAnswer) -> AnswerFacts:
     """What is known of one answer."""
     return filled(
         AnswerFacts,
@@ -134,7 +134,7 @@ def answer_facts(found: Found) -> AnswerFacts:
     )
 
 
-def _overall(study: Study, found: Found) -> OverallAnswer:
+def _overall(study: Study, found: ReadAnswer) -> OverallAnswer:
     parameters = {} if found.case is None else case_values(study, found.case)
     return {**answer_json(found, "1"), "parameters": parameters}
 
@@ -165,7 +165,7 @@ def _place(study: Study, values: Mapping[str, Any], reading: Reading) -> dict[st
     return found
 
 
-def _shown(item: Found, x_unit: str, reading: Reading) -> dict[str, Any]:
+def _shown(item: ReadAnswer, x_unit: str, reading: Reading) -> dict[str, Any]:
     """The other columns of a row."""
     fields = answer_facts(item)
     return {

@@ -47,7 +47,7 @@ Whole = Callable[[Sequence[str]], "CaseColumns"]
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class ReadAnswer:
     """An answer of one curve, or of all cases of a study. Numbers are SI.
 
     Attributes
@@ -95,8 +95,8 @@ class CurveAnswers:
     """The answers of one curve, and its main results at the working point."""
 
     line: Line
-    answers: tuple[Found, ...]
-    working_point: tuple[Found, ...]
+    answers: tuple[ReadAnswer, ...]
+    working_point: tuple[ReadAnswer, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +117,7 @@ class StudyAnswers:
     point: float | None
     unit: str
     curves: tuple[CurveAnswers, ...]
-    overall: tuple[Found, ...]
+    overall: tuple[ReadAnswer, ...]
     drawn: Curves | None
 
 
@@ -185,11 +185,8 @@ def find_answers(
     query: CurveQuery | None,
     point: str | None,
     fetch: Fetch,
-    whole: Whole | None = None,
 ) -> StudyAnswers:
-    """The answers of the curves of ``query``, as `answers_query` gives it.
-
-    ``whole`` gives results of all cases for the extremes among them; without it there are none.
+    """The answers of the curves of ``query``, as `answers_query` gives it, without the extremes among all cases.
 
     Raises
     ------
@@ -197,18 +194,17 @@ def find_answers(
         As `select` does; and where ``point`` is given although there is no axis for it.
     """
     answers, by_name = answers_of_model(study), models.results_by_name(study)
-    overall = () if whole is None else tuple(_overall(study, answers, by_name, whole))
     if query is None:
         if point:
             raise refused("point", "not-used", "the cases of this study lie on no curves", point, allowed="no point")
         single = (_single(study, answers, by_name, fetch),) if study.cases == 1 else ()
-        return StudyAnswers(None, None, "1", single, () if single else overall, None)
+        return StudyAnswers(None, None, "1", single, (), None)
     x = read_point(study, query, point)
     names = dict.fromkeys([*query.y, *(one.result for one in answers)])
     drawn = draw(select(study, replace(query, y=tuple(models.with_half_widths(names, by_name)))), fetch)
     curves = tuple(answers_at(study, query, curve, x) for curve in drawn.curves)
     shown_only = replace(drawn.selection, results=tuple(by_name[name] for name in query.y))
-    return StudyAnswers(query, x, unit_of(study, query.x), curves, overall, replace(drawn, selection=shown_only))
+    return StudyAnswers(query, x, unit_of(study, query.x), curves, (), replace(drawn, selection=shown_only))
 
 
 def answers_at(study: Study, query: CurveQuery, curve: Curve, x: float | None) -> CurveAnswers:
@@ -261,18 +257,22 @@ def _single(
     columns = fetch(np.zeros(1, dtype=np.int64), models.with_half_widths(names, by_name))
     line = Line({}, {}, (0.0,), np.zeros(1, dtype=np.int64))
 
-    def one(answer: Answer) -> Found:
+    def one(answer: Answer) -> ReadAnswer:
         info, value = by_name[answer.result], columns.values[answer.result]
         if math.isfinite(value[0]) and models.usable(study.model, columns.endings, columns.flags, info.name)[0]:
             return _of_case(answer, info, columns, 0, cases=1)
         why = _why(value, columns.endings)
-        return Found(answer, info, info.unit, why=why, case=0, cases=1, flags=_split(columns.flags, [0]))
+        return ReadAnswer(answer, info, info.unit, why=why, case=0, cases=1, flags=_split(columns.flags, [0]))
 
     return CurveAnswers(line, tuple(map(one, here)), tuple(map(one, main)))
 
 
-def _overall(study: Study, answers: Sequence[Answer], by_name: dict[str, ResultInfo], whole: Whole) -> Iterator[Found]:
-    """The extremes among all cases of a study; none of one that chooses its own cases, or has one."""
+def find_overall(study: Study, whole: Whole) -> Iterator[ReadAnswer]:
+    """The extremes among all cases of a study; none of one that chooses its own cases, or has one.
+
+    ``whole`` gives results of all cases by their names.
+    """
+    answers, by_name = answers_of_model(study), models.results_by_name(study)
     extremes = [one for one in answers if one.kind in ("largest", "smallest")]
     if not extremes or study.cases == 1 or study.plan is not None:
         return
@@ -284,7 +284,7 @@ def _overall(study: Study, answers: Sequence[Answer], by_name: dict[str, ResultI
         usable = models.usable(study.model, columns.endings, columns.flags, info.name)
         kept = np.flatnonzero(np.isfinite(values) & usable)
         if not kept.size:
-            yield Found(answer, info, info.unit, why=_why(values, columns.endings))
+            yield ReadAnswer(answer, info, info.unit, why=_why(values, columns.endings))
             continue
         place = int(kept[_best(values[kept], answer)])
         kind = None if regime is None else regime.cell(float(columns.values[regime.name][place]))
@@ -292,10 +292,10 @@ def _overall(study: Study, answers: Sequence[Answer], by_name: dict[str, ResultI
         yield found if kind is None else replace(found, regime=str(kind))
 
 
-def _of_case(answer: Answer, info: ResultInfo, columns: CaseColumns, place: int, cases: int) -> Found:
+def _of_case(answer: Answer, info: ResultInfo, columns: CaseColumns, place: int, cases: int) -> ReadAnswer:
     """The value that the case at a place of the columns has, the best of so many cases."""
     width = columns.values.get(models.half_width(info.name), np.full(place + 1, np.nan))[place]
-    return Found(
+    return ReadAnswer(
         answer, info, info.unit, float(columns.values[info.name][place]),
         case=int(columns.cases[place]),
         cases=cases,
@@ -326,9 +326,9 @@ class _Reader:
         self._x = np.asarray(curve.line.x, dtype=np.float64)
         self._flags = curve.flags or []
 
-    def read(self, answer: Answer, info: ResultInfo) -> Found:
+    def read(self, answer: Answer, info: ResultInfo) -> ReadAnswer:
         """One answer."""
-        way: dict[str, Callable[[Answer, ResultInfo], Found]] = {
+        way: dict[str, Callable[[Answer, ResultInfo], ReadAnswer]] = {
             "at_zero": self._at_zero,
             "until_zero": self._until_zero,
             "here": lambda one, own: self._at(one, own, self._point),
@@ -340,12 +340,12 @@ class _Reader:
         exact = found.answer.kind in ("here", "at_zero", "until_zero") and not found.interpolated
         return found if refined is None or exact else replace(found, error=refined.errors.get(info.name))
 
-    def _of(self, answer: Answer, info: ResultInfo, places: Sequence[int], value: float, **more: object) -> Found:
+    def _of(self, answer: Answer, info: ResultInfo, places: Sequence[int], value: float, **more: object) -> ReadAnswer:
         """A value that was read from the cases at these places of the curve."""
         curve, x = self._curve, self._x
         regimes = {curve.regimes[place] for place in places} if curve.regimes is not None else {None}
         cases = curve.line.cases[list(places)].tolist()
-        found = Found(
+        found = ReadAnswer(
             answer, info, info.unit, value,
             x=float(x[places[0]]),
             case=cases[0],
@@ -361,17 +361,17 @@ class _Reader:
         known = [] if widths is None else [float(widths[place]) for place in places if np.isfinite(widths[place])]
         return max(known, default=None)
 
-    def _at_zero(self, answer: Answer, info: ResultInfo) -> Found:
+    def _at_zero(self, answer: Answer, info: ResultInfo) -> ReadAnswer:
         places = np.flatnonzero(self._x == 0.0)
         if not places.size:
-            return Found(answer, info, info.unit, why="no-case", x=0.0)
+            return ReadAnswer(answer, info, info.unit, why="no-case", x=0.0)
         return self._at(answer, info, 0.0)
 
-    def _extreme(self, answer: Answer, info: ResultInfo) -> Found:
+    def _extreme(self, answer: Answer, info: ResultInfo) -> ReadAnswer:
         values = self._curve.known(info.name)
         kept = np.flatnonzero(np.isfinite(values))
         if not kept.size:
-            return Found(answer, info, info.unit, why=_why(self._curve.y[info.name], self._curve.endings))
+            return ReadAnswer(answer, info, info.unit, why=_why(self._curve.y[info.name], self._curve.endings))
         place = int(kept[_best(values[kept], answer)])
         around = np.unique(self._x[np.isfinite(values)]) if np.all(np.diff(self._x) > 0.0) else self._x[[place]]
         own = int(np.searchsorted(around, self._x[place]))
@@ -380,7 +380,7 @@ class _Reader:
         edge = around.size > 1 and (low is None or high is None)
         return self._of(answer, info, [place], float(values[place]), low=low, high=high, cases=kept.size, edge=edge)
 
-    def _until_zero(self, answer: Answer, info: ResultInfo) -> Found:
+    def _until_zero(self, answer: Answer, info: ResultInfo) -> ReadAnswer:
         """The last x with a value above 0, and the next one with a case at 0."""
         values = self._curve.known(info.name)
         moving = np.flatnonzero(np.nan_to_num(values) > 0.0)
@@ -388,7 +388,7 @@ class _Reader:
         count = int(np.isfinite(values).sum())
         if not moving.size:
             why: Why = "outside" if at_rest.size else _why(self._curve.y[info.name], self._curve.endings)
-            return Found(answer, info, info.unit, why=why, cases=count)
+            return ReadAnswer(answer, info, info.unit, why=why, cases=count)
         last = int(moving[np.argmax(self._x[moving])])
         after = at_rest[self._x[at_rest] > self._x[last]]
         at = float(self._x[last])
@@ -399,9 +399,9 @@ class _Reader:
         other = int(self._curve.line.cases[first])
         return replace(found, high=float(self._x[first]), other=other)
 
-    def _at(self, answer: Answer, info: ResultInfo, point: float | None) -> Found:
+    def _at(self, answer: Answer, info: ResultInfo, point: float | None) -> ReadAnswer:
         """The value at a point of the axis."""
-        nothing = Found(answer, info, info.unit, x=point)
+        nothing = ReadAnswer(answer, info, info.unit, x=point)
         if point is None or not self._x.size:
             return replace(nothing, why="no-case")
         run, values = self._curve.run(), self._curve.known(info.name)

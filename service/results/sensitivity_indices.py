@@ -149,15 +149,15 @@ class Pair:
     error: float | None
 
 
-Found = tuple[list[Indices], list[Pair]]
+IndicesAndPairs = tuple[list[Indices], list[Pair]]
 
 
-def nothing(axes: int) -> Found:
+def nothing(axes: int) -> IndicesAndPairs:
     """No indices at all."""
     return [Indices()] * axes, []
 
 
-def grid_indices(table: Floats, positions: list[int]) -> Found:
+def grid_indices(table: Floats, positions: list[int]) -> IndicesAndPairs:
     """Exact shares of the variance over the points of a full grid, all with equal weight."""
     variance = float(table.var())
     if not variance > 0.0:
@@ -177,7 +177,7 @@ def grid_indices(table: Floats, positions: list[int]) -> Found:
     return found, pairs
 
 
-def saltelli_indices(y: Floats, base: int, dimensions: int, notes: list[str], *, second_order: bool) -> Found:
+def saltelli_indices(y: Floats, base: int, dimensions: int, notes: list[str], *, second_order: bool) -> IndicesAndPairs:
     """SALib's estimates; a point with any missing case is left out with all its cases."""
     from SALib.analyze import sobol
 
@@ -200,7 +200,7 @@ def saltelli_indices(y: Floats, base: int, dimensions: int, notes: list[str], *,
     return indices, pairs
 
 
-def morris_indices(x: Floats, y: Floats, levels: int, notes: list[str]) -> Found:
+def morris_indices(x: Floats, y: Floats, levels: int, notes: list[str]) -> IndicesAndPairs:
     """SALib's elementary effects; a trajectory with any missing case is left out. ``x`` has the shape (cases, axes)."""
     from SALib.analyze import morris
 
@@ -225,7 +225,7 @@ def morris_indices(x: Floats, y: Floats, levels: int, notes: list[str]) -> Found
     return [Indices(**{name: _finite(found[key][i]) for name, key in names.items()}) for i in range(dimensions)], []
 
 
-def sample_indices(x: Floats, y: Floats, notes: list[str]) -> Found:
+def sample_indices(x: Floats, y: Floats, notes: list[str]) -> IndicesAndPairs:
     """First-order indices from a sample (`is_sample`), by SALib's random balance design."""
     from SALib.analyze import rbd_fast
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from sprag_study.sentences import Sentence, sentence_of
 from sprag_study.service.languages import N_, gettext, grouped, ngettext
-from sprag_study.service.reading.reader import told
+from sprag_study.service.reading.reader import shown_stored
 
 
 class Result(StrEnum):
@@ -108,16 +108,16 @@ class Outcome:
         shown = {name: grouped(number) for name, number in numbers.items()}
         first = gettext(_SENTENCES[self.result])
         if self.study is None or self.result is Result.FAILED:
-            first += f": {told(self.reason)}" if self.reason else ""
+            first += f": {shown_stored(self.reason)}" if self.reason else ""
         elif self.result is Result.FINISHED and self.ok == self.cases and not self.flagged:
             first += ": " + gettext("all {cases} cases ended ok", **shown)
         else:
             first += ": " + gettext("{done} of {cases} cases are done, and {ok} of them ended ok", **shown)
         parts = [first, *(_flagged(name, count) for name, count in self.flagged.items())]
         if self.result is Result.HELD and self.reason:
-            parts.append(gettext("It is held: {reason}", reason=told(self.reason)))
+            parts.append(gettext("It is held: {reason}", reason=shown_stored(self.reason)))
         if self.coverage and self.result is not Result.FINISHED:
-            parts.append(gettext("Of the order from coarse to fine, {coverage}", coverage=told(self.coverage)))
+            parts.append(gettext("Of the order from coarse to fine, {coverage}", coverage=shown_stored(self.coverage)))
         if self.missed:
             parts.append(
                 ngettext(

@@ -13,7 +13,7 @@ from sprag_study.service.actor import acting
 from sprag_study.service.spec.components import Component
 from sprag_study.service.storage.errors import ComponentNotFoundError, TooManyComponentsError
 from sprag_study.service.storage.part import Part, moment
-from sprag_study.service.storage.people.audit import edition_of, note, require_edition, require_own
+from sprag_study.service.storage.people.audit import edition_of, note, require_edition, require_owner
 from sprag_study.service.storage.people.pools import pool_of
 from sprag_study.service.storage.tables import METADATA
 from sprag_study.worker.limits import MAX_COMPONENTS
@@ -91,7 +91,7 @@ class Components(Part):
             own = {"id": f"cp_{secrets.token_hex(8)}", "kind": one.kind, "name": one.name, "owner": acting().user}
             change: Any = sa.insert(COMPONENTS).values(values | own)
         else:
-            require_own("component", old.id, old.owner)
+            require_owner("component", old.id, old.owner)
             change = sa.update(COMPONENTS).where(*same).values(values)
         row = connection.execute(change.returning(COMPONENTS)).one()
         action = "component.add" if old is None else "component.change"
@@ -107,7 +107,7 @@ class Components(Part):
             row = connection.execute(sa.select(COMPONENTS).where(_C.id == component_id)).one_or_none()
             if row is None:
                 raise ComponentNotFoundError(component_id)
-            require_own("component", row.id, row.owner)
+            require_owner("component", row.id, row.owner)
             require_edition("component", row.id, _record(row).etag, read)
             connection.execute(sa.delete(COMPONENTS).where(_C.id == component_id))
             note(connection, self._now(), "component.remove", row.id, kind=row.kind, name=row.name)

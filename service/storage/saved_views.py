@@ -14,7 +14,7 @@ from sprag_study.service.faults import Fault, FaultError
 from sprag_study.service.spec.saved_views import View
 from sprag_study.service.storage.errors import TooManyViewsError, ViewNotFoundError
 from sprag_study.service.storage.part import Part, change_row, moment, row_of
-from sprag_study.service.storage.people.audit import edition_of, note, require_edition, require_own
+from sprag_study.service.storage.people.audit import edition_of, note, require_edition, require_owner
 from sprag_study.service.storage.people.pools import pool_of
 from sprag_study.service.storage.tables import METADATA, STUDIES
 from sprag_study.worker.limits import MAX_REPORT_FIGURES, MAX_VIEWS
@@ -96,7 +96,7 @@ class Views(Part):
     def get(self, view_id: str) -> SavedView:
         """One view; raises ViewNotFoundError."""
         with self.session.read() as connection:
-            return _record(_found(connection, view_id))
+            return _record(_row_of(connection, view_id))
 
     def save(self, view: View) -> SavedView:
         """Save a view; one of the same study, page and name is replaced.
@@ -118,13 +118,13 @@ class Views(Part):
                 connection.execute(sa.insert(SAVED_VIEWS).values(own | self._content(view.query)))
             else:
                 identity = old.id
-                require_own("view", identity, old.owner)
+                require_owner("view", identity, old.owner)
                 connection.execute(sa.update(SAVED_VIEWS).where(_V.id == identity).values(self._content(view.query)))
-            row = _found(connection, identity)
+            row = _row_of(connection, identity)
             detail = {"page": view.page, "name": view.name, "study": view.study}
             note(connection, self._now(), "view.save", identity, **detail, in_report=view.in_report)
             self._put_in_report(connection, row, wanted=view.in_report or row.place is not None, place=row.place)
-            return _record(_found(connection, identity))
+            return _record(_row_of(connection, identity))
 
     def change(self, view_id: str, change: ViewChange, read: Collection[str] | None = None) -> SavedView:
         """Change a view; raises as `save` does, and ViewNotFoundError, FaultError for a name that is taken.
@@ -132,8 +132,8 @@ class Views(Part):
         ``read``: the editions (`SavedView.etag`) that the change is meant for; ChangedMeanwhileError for any other.
         """
         with self.session.write() as connection:
-            row = _found(connection, view_id)
-            require_own("view", view_id, row.owner)
+            row = _row_of(connection, view_id)
+            require_owner("view", view_id, row.owner)
             require_edition("view", view_id, _record(row).etag, read)
             if change.name not in (None, row.name):
                 same = (_V.page == row.page, _V.study.is_not_distinct_from(row.study), _V.name == change.name)
@@ -149,13 +149,13 @@ class Views(Part):
             wanted = kept or change.place is not None
             note(connection, self._now(), "view.change", view_id, name=change.name or row.name, in_report=wanted)
             self._put_in_report(connection, row, wanted=wanted, place=change.place or row.place)
-            return _record(_found(connection, view_id))
+            return _record(_row_of(connection, view_id))
 
     def remove(self, view_id: str, read: Collection[str] | None = None) -> None:
         """Remove a view; raises ViewNotFoundError, NotOwnerError; ``read`` as for `change`."""
         with self.session.write() as connection:
-            row = _found(connection, view_id)
-            require_own("view", view_id, row.owner)
+            row = _row_of(connection, view_id)
+            require_owner("view", view_id, row.owner)
             require_edition("view", view_id, _record(row).etag, read)
             self._put_in_report(connection, row, wanted=False)
             connection.execute(sa.delete(SAVED_VIEWS).where(_V.id == view_id))
@@ -170,7 +170,7 @@ class Views(Part):
         """Put a view at a place of its study's report, by default the last one, or take it out."""
         if row.study is None or not (wanted or row.place is not None):
             return
-        require_own("study", row.study_id, row.study_owner)
+        require_owner("study", row.study_id, row.study_owner)
         figures = sa.select(_V.id).where(_V.study == row.study, _V.place.is_not(None), _V.id != row.id)
         order = list(connection.execute(figures.order_by(_V.place, _V.number)).scalars())
         if wanted and len(order) >= MAX_REPORT_FIGURES:
@@ -201,7 +201,7 @@ def _fault(where: str, code: Any, message: str, value: object, allowed: str) -> 
     return FaultError("invalid-body", str(fault), (fault,))
 
 
-def _found(connection: sa.Connection, view_id: str) -> sa.Row[Any]:
+def _row_of(connection: sa.Connection, view_id: str) -> sa.Row[Any]:
     """The row of a view; raises ViewNotFoundError."""
     row = connection.execute(_SHOWN.where(_V.id == view_id)).one_or_none()
     if row is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -13,7 +13,14 @@ from sprag_study.service.figures.pictures import Picture, require_drawable
 from sprag_study.service.results.curve_cases import select
 from sprag_study.service.results.curves import CurveQuery
 from sprag_study.service.results.key_answer_words import answers_csv, report
-from sprag_study.service.results.key_answers import StudyAnswers, answers_query, find_answers, read_point
+from sprag_study.service.results.key_answers import (
+    ReadAnswer,
+    StudyAnswers,
+    answers_query,
+    find_answers,
+    find_overall,
+    read_point,
+)
 from sprag_study.service.storage.studies.records import CaseColumns
 from sprag_study.service.views import study_view
 from sprag_study.service.views.curves import completed_query
@@ -45,26 +52,31 @@ def answers_of(library: Library, study_id: str, chosen: CurveQuery | None, point
         raise refused(
             "x", "not-used", "the cases of this study lie on no curves", chosen.x, allowed="no choice of curves"
         )
+    found = answers_in(library, study_id, query, point)
     # While a large study runs, all its rows would be read again for each of its chunks.
-    over = library.store.studies.get(study_id).over or study.cases <= study_view.FEW
-    return answers_in(library, study_id, query, point, overall=over)
+    if not library.store.studies.get(study_id).over and study.cases > study_view.FEW:
+        return found
+    return replace(found, overall=overall_in(library, study_id))
 
 
-def answers_in(
-    library: Library, study_id: str, query: CurveQuery | None, point: str | None, *, overall: bool = False
-) -> StudyAnswers:
-    """The answers of curves, found once until the study has other rows; raises as `find_answers` does.
-
-    The extremes among all cases only if ``overall``.
-    """
+def answers_in(library: Library, study_id: str, query: CurveQuery | None, point: str | None) -> StudyAnswers:
+    """The answers of curves, found once until the study has other rows; raises as `find_answers` does."""
 
     def find() -> StudyAnswers:
-        whole = partial(whole_columns, library, study_id) if overall else None
         fetch = partial(library.store.rows.for_cases, study_id)
-        return find_answers(library.store.studies.study(study_id), query, point, fetch, whole)
+        return find_answers(library.store.studies.study(study_id), query, point, fetch)
 
     revision = library.store.studies.get(study_id).revision
-    return library.answers.of((study_id, revision, query, point, overall), find)
+    return library.answers.of((study_id, revision, query, point), find)
+
+
+def overall_in(library: Library, study_id: str) -> tuple[ReadAnswer, ...]:
+    """The extremes among all cases, found once until the study has other rows."""
+
+    def find() -> tuple[ReadAnswer, ...]:
+        return tuple(find_overall(library.store.studies.study(study_id), partial(whole_columns, library, study_id)))
+
+    return library.overall.of((study_id, library.store.studies.get(study_id).revision), find)
 
 
 def whole_columns(library: Library, study_id: str, names: Sequence[str]) -> CaseColumns:

@@ -6,9 +6,9 @@ from typing import Final
 
 from sprag_study.service.languages import gettext
 from sprag_study.service.reading.numbers import parse_number
-from sprag_study.service.reading.quantities import TYPED, Units, offered, preferred, read_units
+from sprag_study.service.reading.quantities import TYPED, Units, preferred, read_units, typed_unit
 from sprag_study.service.reading.reader import Reading
-from sprag_study.service.reading.units import QuantityError, parse_quantity, split_quantity
+from sprag_study.service.reading.units import QuantityError, parse_quantity
 from sprag_study.service.reading.wording import typed_text
 from sprag_study.service.spec.components import (
     COEFFICIENTS,
@@ -48,9 +48,7 @@ def _printed(kind: str, choice: str, text: str, si: str) -> str:
         value = parse_quantity(text if number is None else number, si)
         units = preferred(choice, model)
         if read_units(choice)[0] == TYPED:
-            typed = f"1 {split_quantity(text)[1] or si}"
-            same = (unit for unit in offered(si) if parse_quantity(f"1 {unit}", si) == parse_quantity(typed, si))
-            units = {si: next(same, si)}
+            units = {si: typed_unit(text, si) or si}
         return Reading(model, Units(units)).quantity(value, si, _DIGITS)
     except QuantityError:  # kept by an earlier release
         return typed_text(text)

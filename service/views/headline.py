@@ -26,7 +26,7 @@ from sprag_study.service.results.key_answers import answers_query
 from sprag_study.service.results.refined_maps import map_plan
 from sprag_study.service.results.sweeps import hysteresis
 from sprag_study.service.storage.database.session import in_one_moment
-from sprag_study.service.views.answers import answers_in
+from sprag_study.service.views.answers import answers_in, overall_in
 from sprag_study.service.views.relatives import asked_by
 from sprag_study.service.views.study_view import FEW
 from sprag_study.worker import models
@@ -79,7 +79,7 @@ def _headline(library: Library, study_id: str, query: CurveQuery | None, point: 
     if not progress.ok:
         return Headline((_nothing_ok(progress),))
     key = study_id, record.revision, query, point, curve
-    found = library.told.of(key, lambda: _found(library, study_id, study, record, query, point, curve))
+    found = library.told.of(key, lambda: _of_cases(library, study_id, study, record, query, point, curve))
     sentence = found.sentence or (
         Phrase("There is no answer yet.") if not record.over else Phrase("There is no answer."),
     )
@@ -116,7 +116,7 @@ def _so_far(progress: Progress) -> Phrase:
     )  # fmt: skip
 
 
-def _found(
+def _of_cases(
     library: Library,
     study_id: str,
     study: Study,
@@ -138,8 +138,9 @@ def _found(
     if mapped is not None and query is None:
         return _of_map(study, mapped, fetch(np.arange(study.cases, dtype=np.int64), mapped.results))
     asked = answers_query(study, query or usual_query(library, study_id))
-    overall = asked is None and study.cases > 1
-    found = answers_in(library, study_id, asked, point if asked is not None else None, overall=overall)
+    found = answers_in(library, study_id, asked, None if asked is None else point)
+    if asked is None:
+        found = replace(found, overall=overall_in(library, study_id))
     told = along_headline(study, found, curve, asked=bool(point))
     if study.sweep is not None and found.drawn is not None and (text := hysteresis(found.drawn)):
         told = replace(told, sentence=(*told.sentence[:1], joined("", [text])))

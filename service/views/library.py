@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     from sprag_study.service.results.calibration import Calibration
     from sprag_study.service.results.fronts import Designs
     from sprag_study.service.results.headlines.headline import Headline
-    from sprag_study.service.results.key_answers import StudyAnswers
+    from sprag_study.service.results.key_answers import ReadAnswer, StudyAnswers
     from sprag_study.service.storage.store import Store
     from sprag_study.service.storage.studies.records import StudyRecord
     from sprag_study.worker.chunking import Chunking
 
 Key = TypeVar("Key")
-Found = TypeVar("Found")
+Derived = TypeVar("Derived")
 
 #: Calibrations that are kept.
 _CALIBRATIONS: Final = 16
@@ -39,41 +39,41 @@ _CALIBRATIONS: Final = 16
 _DESIGNS: Final = 50_000
 
 
-class Kept(Generic[Key, Found]):
+class Kept(Generic[Key, Derived]):
     """What has been found, by a key, for all threads."""
 
-    def __init__(self, cache: LRUCache[Key, Found]) -> None:
+    def __init__(self, cache: LRUCache[Key, Derived]) -> None:
         self._lock = Lock()
         self._cache = cache
 
-    def get(self, key: Key) -> Found | None:
+    def get(self, key: Key) -> Derived | None:
         """What is kept of the key."""
         with self._lock:
             return self._cache.get(key)
 
-    def put(self, key: Key, found: Found) -> Found:
+    def put(self, key: Key, found: Derived) -> Derived:
         """Keep what has been found, and return it."""
         with self._lock, suppress(ValueError):  # too large to be kept
             self._cache[key] = found
         return found
 
-    def of(self, key: Key, find: Callable[[], Found]) -> Found:
+    def of(self, key: Key, find: Callable[[], Derived]) -> Derived:
         """What is kept of the key, otherwise what ``find`` finds."""
         known = self.get(key)
         return self.put(key, find()) if known is None else known
 
 
-class _OfRows(Generic[Found]):
+class _OfRows(Generic[Derived]):
     """What is found in the rows of a study, anew only when it has other rows."""
 
-    def __init__(self, store: Store, cache: LRUCache[tuple[object, ...], Found]) -> None:
+    def __init__(self, store: Store, cache: LRUCache[tuple[object, ...], Derived]) -> None:
         self._store = store
         self._kept = Kept(cache)
 
-    def _of(self, study_id: str, find: Callable[..., Found], **options: bool) -> Found:
+    def _of(self, study_id: str, find: Callable[..., Derived], **options: bool) -> Derived:
         store = self._store
 
-        def made() -> Found:
+        def made() -> Derived:
             fetch = partial(store.rows.for_cases, study_id)
             return find(store.studies.study(study_id), store.studies.rounds(study_id), fetch, **options)
 
@@ -146,6 +146,8 @@ class Library:
         self.told: Kept[tuple[object, ...], Headline] = Kept(LRUCache(_TOLD))
         #: Answers of curves by study, its revision, and the question.
         self.answers: Kept[tuple[object, ...], StudyAnswers] = Kept(LRUCache(_ANSWERS, getsizeof=_numbers))
+        #: Extremes among all cases by study and its revision.
+        self.overall: Kept[tuple[str, int], tuple[ReadAnswer, ...]] = Kept(LRUCache(_TOLD))
         self._unaffected: Kept[tuple[str, int], tuple[str, ...]] = Kept(LRUCache(_UNAFFECTED))
         #: Of listed studies the revision, and headline and description where they have them (`views.listed`).
         self.headlines: Kept[str, tuple[int, tuple[Headline, Phrase] | None]] = Kept(LRUCache(_LISTED))

@@ -128,7 +128,7 @@ class StudyView(ABC, Generic[Question, Chosen, Result]):
         return draw_figure(read_figure(self.drawn_in(answer, 2), reading), title, form)
 
 
-def found(
+def answer_of(
     library: Library, study_id: str, view: StudyView[Any, Chosen, Result], chosen: Chosen, *, drawn: bool = False
 ) -> StudyAnswer[Chosen, Result]:
     """Find the view of a study, as numbers or to be ``drawn``."""
@@ -140,7 +140,7 @@ def study_file(
     library: Library, study_id: str, view: StudyView[Any, Any, Any], chosen: Any, choice: Choice, title: str, form: str
 ) -> bytes:
     """Find the view of a study and write it as JSON, as CSV, or as a picture."""
-    return written(view, found(library, study_id, view, chosen, drawn=is_drawn(form)), choice, title, form)
+    return written(view, answer_of(library, study_id, view, chosen, drawn=is_drawn(form)), choice, title, form)
 
 
 def is_drawn(form: str) -> bool:

@@ -17,7 +17,7 @@ from sprag_study.service.cli.shown import yield_text
 from sprag_study.service.jobs.local import run_here
 from sprag_study.service.spec.document import parse_spec
 from sprag_study.service.views.drives import RibbonQuery, RibbonView, YieldQuery, YieldView
-from sprag_study.service.views.study_view import found
+from sprag_study.service.views.study_view import answer_of
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "guide-tolerances.md").read_text(encoding="utf-8")
@@ -31,8 +31,8 @@ def answers(spec: dict[str, Any]) -> Iterator[tuple[RibbonLine, YieldLine]]:
     with run_here(parsed.spec, parsed.study, processes=0) as done:
         library: Any = SimpleNamespace(store=done.store)
         ribbons, yields, study = RibbonView(), YieldView(), done.record.id
-        ribbon = ribbons.json(found(library, study, ribbons, RibbonQuery((SPEED,))))
-        reached = yields.json(found(library, study, yields, YieldQuery((f"{SPEED} >= 90 % of nominal",))))
+        ribbon = ribbons.json(answer_of(library, study, ribbons, RibbonQuery((SPEED,))))
+        reached = yields.json(answer_of(library, study, yields, YieldQuery((f"{SPEED} >= 90 % of nominal",))))
         yield ribbon["lines"][0], reached["lines"][0]
 
 

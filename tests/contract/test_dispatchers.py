@@ -129,7 +129,7 @@ def test_dispatchers_tell_what_their_fingerprints_differ_in(
     store.work.take_over("second")
     assert [record.differs for record in store.dispatchers.all()] == [None, None]
     monkeypatch.setattr(fingerprint, "digest", lambda: "another")
-    monkeypatch.setattr(fingerprint, "own", partial(dict, fingerprint.own(), Python="2.7"))
+    monkeypatch.setattr(fingerprint, "present", partial(dict, fingerprint.present(), Python="2.7"))
     store.work.take_over("third")
     found = worker_list(store.dispatchers)["dispatchers"]
     assert [item["differs"] for item in found] == [None, None, f"Python: 2.7 instead of {platform.python_version()}"]

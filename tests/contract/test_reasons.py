@@ -10,7 +10,7 @@ import sqlalchemy as sa
 
 from sprag_study.sentences import Amount, Sentence
 from sprag_study.service.languages import language, recorded
-from sprag_study.service.reading.reader import told
+from sprag_study.service.reading.reader import shown_stored
 from sprag_study.service.schedules.fields import read_fields
 from sprag_study.service.schedules.outcomes import Outcome
 from sprag_study.service.schedules.policies import DueTime
@@ -30,7 +30,7 @@ WINDOW = Sentence(recorded.OUTSIDE_WINDOW, window=Window(time(22), time(6), "Eur
 
 def in_ukrainian(text: str | None) -> str:
     with language("uk"):
-        return told(text or "")
+        return shown_stored(text or "")
 
 
 @pytest.mark.parametrize("how", ["hold", "fault", "note", "window"])

@@ -128,7 +128,7 @@ def test_a_difference_says_from_which_dispatcher(
     monkeypatch.setattr(service.store.dispatchers, "presence", fakes.Present())
     service.store.work.take_over("head:7")
     monkeypatch.setattr(fingerprint, "digest", lambda: "another")
-    monkeypatch.setattr(fingerprint, "own", partial(dict, fingerprint.own(), Python="2.7"))
+    monkeypatch.setattr(fingerprint, "present", partial(dict, fingerprint.present(), Python="2.7"))
     service.store.work.take_over("other:8")
     difference = f"Python: 2.7 instead of {platform.python_version()}"
     assert f"<code>another</code> (differs from that of head:7: {difference})" in service.http.get("/me/workers").text

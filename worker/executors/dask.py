@@ -90,7 +90,7 @@ class DaskExecutor:
         self._timeout, self._wall = chunk_timeout, WALL_TIMES * chunk_timeout
         self._run = run
         self._load = load
-        self._expected = fingerprint.own() if expected is None else expected
+        self._expected = fingerprint.present() if expected is None else expected
         self._digest = fingerprint.digest_of(self._expected)
         self._scheduler_seconds = scheduler_seconds
         self._name = uuid4().hex[:12]

@@ -70,7 +70,7 @@ def has_caption(model: str, name: str) -> bool:
 @lru_cache(maxsize=4096)
 def _caption(model: str, name: str) -> tuple[str, str, tuple[str, str] | None]:
     """The text, the number for its ``{}``, and word and number of the part that it belongs to."""
-    own, part = _own(name)
+    own, part = _within_part(name)
     captions = model_of(model).presentation.captions
     general = general_path(name)
     found = next((captions[key] for key in (name, general, general_path(own)) if key in captions), None)
@@ -107,7 +107,7 @@ def caption_texts(model: str) -> list[str]:
     return list(dict.fromkeys([HALF_WIDTH, *(word for _, word in _PARTS), *axes, *found]))
 
 
-def _own(name: str) -> tuple[str, tuple[str, str] | None]:
+def _within_part(name: str) -> tuple[str, tuple[str, str] | None]:
     """The name within its numbered part; word and number of this part."""
     for first, word in _PARTS:
         found = re.fullmatch(rf"{re.escape(first)}\.(\d+|\*)\.(.+)", name)

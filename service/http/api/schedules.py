@@ -72,7 +72,7 @@ async def create_schedule(
     store = context.store
 
     def keep(fields: ScheduleFields, key: str | None, body_hash: str) -> Response:
-        return _made(context, store.schedules.create(fields, idempotency_key=key, body_hash=body_hash))
+        return _created(context, store.schedules.create(fields, idempotency_key=key, body_hash=body_hash))
 
     if idempotency_key is None:
         return await in_thread(keep, await _fields(context, work, received, None), None, "")
@@ -80,7 +80,7 @@ async def create_schedule(
     body_hash = await work.read(hash_of, received)
     known = await in_thread(store.schedules.of_key, idempotency_key, body_hash)
     if known is not None:
-        return await in_thread(_made, context, known)
+        return await in_thread(_created, context, known)
     return await in_thread(keep, await _fields(context, work, received, None), idempotency_key, body_hash)
 
 
@@ -94,7 +94,7 @@ def _tag(record: ScheduleRecord) -> str:
     return f"W/{edition_tag(record.etag)}"
 
 
-def _made(context: Context, record: ScheduleRecord) -> Response:
+def _created(context: Context, record: ScheduleRecord) -> Response:
     content = detail(context.store, record)
     return json_response(content, 201, {"Location": schedule_address(record.id)})
 

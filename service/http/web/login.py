@@ -12,7 +12,7 @@ from sprag_study.service.http.routers import page_router
 from sprag_study.service.http.web.form.values import Form
 from sprag_study.service.http.web.way_in import LOGIN_PATH, access_of, kept_form, kept_page, login_page, within
 from sprag_study.service.languages import _
-from sprag_study.service.reading.reader import told
+from sprag_study.service.reading.reader import shown_stored
 
 router = page_router()
 
@@ -34,7 +34,7 @@ async def log_in(request: Request, values: Form) -> Response:
         grant = access.of_token(token)
         if grant is None:
             await access.attempts.failed(request.scope, "page /login")
-            fault = told(access.why_not(token) or "") or _("This token is not valid.")
+            fault = shown_stored(access.why_not(token) or "") or _("This token is not valid.")
             return login_page(request, access, wanted, fault=fault, status=401, kept=kept)
     except ApiError as error:
         response = login_page(request, access, wanted, fault=error.detail, status=error.type.status, kept=kept)

@@ -39,7 +39,7 @@ from sprag_study.service.jobs.workers import worker_list
 from sprag_study.service.languages import N_, _
 from sprag_study.service.reading.faults import message
 from sprag_study.service.reading.quantities import KINDS, SI, TYPED, WORKSHOP, read_units
-from sprag_study.service.reading.reader import CAPTIONS, CODES, Choice, told
+from sprag_study.service.reading.reader import CAPTIONS, CODES, Choice, shown_stored
 from sprag_study.service.settings import DEFAULT_ORIGIN, HIDDEN, OPTION_ORIGIN
 from sprag_study.service.storage.errors import StoreError, TokenNotFoundError, UserNotFoundError
 from sprag_study.service.storage.people.audit import AuditPage, audit_filter
@@ -194,7 +194,7 @@ async def _changed(
     try:
         created = await in_thread(change)
     except FaultError as error:
-        faults = {str(fault.where): message(fault) for fault in error.faults} or {"": told(error.detail)}
+        faults = {str(fault.where): message(fault) for fault in error.faults} or {"": shown_stored(error.detail)}
     except UserNotFoundError:
         faults = {"": _("There is no such user any more, or nobody is chosen.")}
     except TokenNotFoundError:
@@ -230,7 +230,7 @@ def try_reports(context: Ctx, values: Form) -> Response:
             context.store.audit.note("report.test", to[:_LONGEST], by=by)
             send(to, context.settings.reports, context.store.clock.now())
         except DeliveryError as error:
-            shown = {"problem": told(str(error))}
+            shown = {"problem": shown_stored(str(error))}
         else:
             status, shown = 200, {"sent": to}
         finally:

@@ -33,7 +33,7 @@ from sprag_study.service.languages import _
 from sprag_study.service.reading.catalogue import unit_of
 from sprag_study.service.reading.reader import Phrase, joined, meanings
 from sprag_study.service.results.defaults import main_results
-from sprag_study.service.results.headlines.along import told
+from sprag_study.service.results.headlines.along import case_clause
 from sprag_study.service.results.headlines.headline import MOST, NOTHING, KeyNumber, amount, digits
 from sprag_study.service.results.regimes import ORDER, coasting_sentence, motion_sentence
 from sprag_study.service.results.selection import axis_name, own_paths
@@ -270,7 +270,7 @@ def _said(study: Study, row: CaseRow) -> list[str]:
     values = {name: value for name in infos if isinstance(value := row.results[name], float)}
     widths = {name: values[width] for name in values if values.get(width := models.half_width(name), 0.0) > 0.0}
     main = main_results(study)
-    said: list[Part] = [Whole(told(study, {name: values[name] for name in main if name in values}, widths))]
+    said: list[Part] = [Whole(case_clause(study, {name: values[name] for name in main if name in values}, widths))]
     regime, order = row.results.get("regime"), row.results.get(ORDER)
     if isinstance(regime, str) and regime not in row.flags:
         said.append(motion_sentence(regime, order if isinstance(order, int) else None))

@@ -30,7 +30,7 @@ from sprag_study.service.languages import N_
 from sprag_study.service.reading import times
 from sprag_study.service.reading.faults import allowed_text, fault_text, value_text
 from sprag_study.service.reading.quantities import KINDS, SI, TYPED, WORKSHOP, read_units
-from sprag_study.service.reading.reader import CLUTCH, Reading, model_title, shown, titled, told, word
+from sprag_study.service.reading.reader import CLUTCH, Reading, model_title, shown, shown_stored, titled, word
 from sprag_study.service.reading.wording import counted, duration, number, symbol, typed_text, unit_text
 from sprag_study.service.report.html import embedded, sheet_of
 from sprag_study.worker import models
@@ -134,7 +134,7 @@ def _templates() -> Environment:
         "words": titled,
         "word": word,
         "text": languages.gettext,
-        "recorded": told,
+        "recorded": shown_stored,
         "say": shown,
         "fault": fault_text,
         "warning": _warning,

@@ -17,7 +17,7 @@ from sprag_study.service.http.grants import Grant
 from sprag_study.service.http.web.form.values import read_form
 from sprag_study.service.http.web.problem_page import wants_page
 from sprag_study.service.http.web.templates import page
-from sprag_study.service.reading.reader import told
+from sprag_study.service.reading.reader import shown_stored
 
 if TYPE_CHECKING:
     from starlette.requests import Request
@@ -73,7 +73,7 @@ def login_page(
     """The form for the token, with the destination ``wanted`` and the form ``kept`` for it, if any."""
     grant = cast("Grant | None", request.scope.get("sprag.grant"))
     if grant is None:
-        fault = fault or told(access.why_ended(request.cookies) or "")
+        fault = fault or shown_stored(access.why_ended(request.cookies) or "")
     return _private(
         "login.html",
         status=status,

@@ -17,7 +17,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from sprag_study.sentences import sentence_of
 from sprag_study.service.json_text import timestamp, to_bytes
 from sprag_study.service.languages import ENGLISH, N_, _, current, grouped, language, ngettext
-from sprag_study.service.reading.reader import shown, term, told
+from sprag_study.service.reading.reader import shown, shown_stored, term
 from sprag_study.service.schedules.outcomes import Outcome
 from sprag_study.service.schedules.times import wall_clock
 
@@ -56,7 +56,7 @@ def sentence(content: dict[str, Any]) -> str:
     outcome = content.get("outcome")
     if outcome is None:
         values = content.get("known", {}).get("sentence_values")
-        return told(str(content["sentence"]) if values is None else sentence_of(values))
+        return shown_stored(str(content["sentence"]) if values is None else sentence_of(values))
     if current() == ENGLISH or "known" not in content:  # of a report that an earlier version has put off
         return str(outcome["sentence"])
     names = {item.name for item in fields(Outcome)}
@@ -73,7 +73,7 @@ def facts(content: dict[str, Any]) -> Iterator[Fact]:
     if outcome["ended_at"] is not None:
         yield Fact(_("Ended"), wall_clock(datetime.fromisoformat(outcome["ended_at"]), content["zone"]))
     if outcome["coverage"] is not None:
-        yield Fact(_("Coverage"), told(_coverage(content)))
+        yield Fact(_("Coverage"), shown_stored(_coverage(content)))
     endings, flags = outcome["endings"] or {}, outcome["flags"] or {}
     yield from (Fact(_("Ended {name}", name=_words(name)), _cases(count)) for name, count in endings.items())
     yield from (Fact(_("Flag {name}", name=_words(name)), _cases(count)) for name, count in flags.items())

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from sprag_study.sentences import Part
     from sprag_study.service.results.curves import Curve
-    from sprag_study.service.results.key_answers import CurveAnswers, Found, StudyAnswers
+    from sprag_study.service.results.key_answers import CurveAnswers, ReadAnswer, StudyAnswers
     from sprag_study.service.results.refined import Line
     from sprag_study.worker.models import ResultInfo
     from sprag_study.worker.study import Study
@@ -93,7 +93,7 @@ def wanted_of(study: Study, name: str, parameters: Mapping[str, float | str] | N
     return value if isinstance(value, float) and np.isfinite(value) else None
 
 
-def told(study: Study, values: Mapping[str, float], widths: Mapping[str, float]) -> Phrase:
+def case_clause(study: Study, values: Mapping[str, float], widths: Mapping[str, float]) -> Phrase:
     """The clause about a case with these results; "" where none can be said."""
     clauses, infos = models.presentation_of(study).clauses, models.results_by_name(study)
     names = {place: name for place, name in clauses.results.items() if name in infos}
@@ -236,7 +236,7 @@ def _clause(own: Along, place: int) -> Phrase:
     widths = {name: width for name in values if (width := _width(own, place, name)) is not None}
     first = own.first.name
     values = {first: values[first], **values}
-    return NOTHING if not np.isfinite(values[first]) else told(own.study, values, widths)
+    return NOTHING if not np.isfinite(values[first]) else case_clause(own.study, values, widths)
 
 
 def _width(own: Along, place: int, name: str) -> float | None:
@@ -296,7 +296,7 @@ def curve_numbers(answers: CurveAnswers, x_unit: str) -> list[KeyNumber]:
     return [_number(one, x_unit, None) for one in answers.answers or answers.working_point]
 
 
-def _number(found: Found, x_unit: str, own: Along | None) -> KeyNumber:
+def _number(found: ReadAnswer, x_unit: str, own: Along | None) -> KeyNumber:
     """An answer as a key number; between two cases of its ``own`` curve what both of them have."""
     if found.answer.kind == "until_zero" and found.value is not None:
         return _stall(found)
@@ -312,7 +312,7 @@ def _number(found: Found, x_unit: str, own: Along | None) -> KeyNumber:
     return replace(made, value=None, low=ends[0], high=ends[-1])
 
 
-def _key(found: Found, note: Phrase) -> KeyNumber:
+def _key(found: ReadAnswer, note: Phrase) -> KeyNumber:
     """The value of an answer as a key number."""
     answer, count = found.answer, digits(found.value or 0.0, found.half_width)
     return KeyNumber(
@@ -320,14 +320,14 @@ def _key(found: Found, note: Phrase) -> KeyNumber:
     )
 
 
-def _where(found: Found, x_unit: str) -> Phrase:
+def _where(found: ReadAnswer, x_unit: str) -> Phrase:
     if found.other is not None and found.low is not None and found.high is not None:
         ends = Amount(found.low, x_unit, OF_PLACES, bare=True), Amount(found.high, x_unit, OF_PLACES)
         return Phrase("between {low} and {high}", low=ends[0], high=ends[1])
     return NOTHING if found.x is None else Phrase("at {place}", place=Amount(found.x, x_unit, OF_PLACES))
 
 
-def _doubt(found: Found) -> Phrase:
+def _doubt(found: ReadAnswer) -> Phrase:
     """What should make one careful: the end of an axis, an irregular motion."""
     parts: list[Phrase] = [Phrase("at the end of the axis")] if found.edge and found.x else []
     if found.regime not in (None, "periodic", "coasting"):
@@ -335,7 +335,7 @@ def _doubt(found: Found) -> Phrase:
     return joined(", ", parts)
 
 
-def _stall(found: Found) -> KeyNumber:
+def _stall(found: ReadAnswer) -> KeyNumber:
     there = NOTHING
     if found.above and found.there is not None:
         there = Phrase("there {value}", value=amount(found.info, found.there))
@@ -350,7 +350,7 @@ def _no_curve(study: Study, found: StudyAnswers) -> Headline:
         one = found.curves[0]
         values = {item.info.name: item.value for item in (*one.working_point, *one.answers) if item.value is not None}
         widths = {item.info.name: item.half_width for item in one.working_point if item.half_width}
-        clause = told(study, values, widths)
+        clause = case_clause(study, values, widths)
         numbers = [_plain(item) for item in (*one.answers, *one.working_point) if item.value is not None]
         numbers = list({number.label: number for number in numbers}.values())
         says = (joined("", [Whole(clause)]),) if clause else ()
@@ -371,5 +371,5 @@ def _no_curve(study: Study, found: StudyAnswers) -> Headline:
     return Headline(says, tuple(numbers[:MOST]))
 
 
-def _plain(item: Found) -> KeyNumber:
+def _plain(item: ReadAnswer) -> KeyNumber:
     return _key(item, note_of(answer_facts(item), "1") if item.flags or item.regime else NOTHING)

@@ -42,7 +42,7 @@ class Block:
     lines: tuple[int, ...] = ()
 
 
-def made(blocks: Iterable[Block]) -> list[dict[str, Column]] | None:
+def block_columns(blocks: Iterable[Block]) -> list[dict[str, Column]] | None:
     """The columns of every block; None when any block is invalid."""
     found = [block.make() for block in blocks]
     return None if None in found else [columns for columns in found if columns is not None]

@@ -20,9 +20,9 @@ from sprag_study.service.spec.axes.axes import ADAPTIVE, AXIS, check_paths, expa
 from sprag_study.service.spec.axes.blocks import (
     Block,
     as_axes,
+    block_columns,
     chosen,
     first_rows,
-    made,
     one_after_another,
     product,
     side_by_side,
@@ -160,7 +160,7 @@ def _group(group: Node, combine: str | None) -> Block | None:
 
 
 def _make(node: Node, blocks: list[Block], combine: str) -> dict[str, NDArray[np.float64]] | None:
-    tables = made(blocks)
+    tables = block_columns(blocks)
     if tables is None:
         return None
     counts = [_length(columns) for columns in tables]

@@ -99,13 +99,13 @@ def merged(blocks: Iterable[Block]) -> Iterator[Block]:
         waiting.append(part)
         count += len(part.cases)
         if count >= MERGED_ROWS:
-            yield _one(waiting)
+            yield _merged(waiting)
             waiting, count = [], 0
     if waiting:
-        yield _one(waiting)
+        yield _merged(waiting)
 
 
-def _one(blocks: Sequence[Block]) -> Block:
+def _merged(blocks: Sequence[Block]) -> Block:
     if len(blocks) == 1:
         (one,) = blocks
         return Block(one.studies, one.cases, one.endings, one.flags, as_kept(one.values))

@@ -236,7 +236,7 @@ class Session:
                 self._turn.notify()
 
     @contextmanager
-    def write_own(self) -> Iterator[sa.Connection]:
+    def write_rows(self) -> Iterator[sa.Connection]:
         """A write transaction for rows that it locks itself: on a server it waits for no other writer.
 
         For a file it is a `write`.

@@ -132,7 +132,7 @@ def note(connection: sa.Connection, now: int, action: str, target: str, /, **det
     connection.execute(sa.insert(AUDIT_LOG).values(values))
 
 
-def require_own(kind: str, identity: str, owner: str | None) -> None:
+def require_owner(kind: str, identity: str, owner: str | None) -> None:
     """Raise NotOwnerError where the present actor may not change what belongs to ``owner``."""
     actor = acting()
     if owner is not None and owner != actor.user and not actor.everything:

@@ -290,7 +290,7 @@ class People(Part):
 
     def note_uses(self, uses: Mapping[str, int]) -> None:
         """Record when tokens were last used: µs since 1970 by id."""
-        with self.session.write_own() as connection:
+        with self.session.write_rows() as connection:
             for token_id, used in sorted(uses.items()):  # in one order, so that two services do not wait for each other
                 later = TOKENS.c.used_at.is_(None) | (TOKENS.c.used_at < used)
                 connection.execute(sa.update(TOKENS).where(TOKENS.c.id == token_id, later).values(used_at=used))

@@ -84,7 +84,7 @@ class CasesOf:
 def remember(connection: sa.Connection) -> None:
     """Store the fingerprint of this process, unless it is there."""
     insert = postgresql.insert if connection.dialect.name == "postgresql" else sqlite.insert
-    own = insert(FINGERPRINTS).values(digest=fingerprint.digest(), content=fingerprint.text_of(fingerprint.own()))
+    own = insert(FINGERPRINTS).values(digest=fingerprint.digest(), content=fingerprint.text_of(fingerprint.present()))
     connection.execute(own.on_conflict_do_nothing())
 
 

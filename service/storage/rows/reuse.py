@@ -76,7 +76,7 @@ _MIXED: Final = WarningText(
 
 
 @dataclass(frozen=True, slots=True)
-class _Found:
+class _Reused:
     """Cases of a study, ascending, with the number of the study that has each and its case there."""
 
     cases: Ints
@@ -90,7 +90,7 @@ class Reuse(Part):
     def __init__(self, session: Session, clock: Clock, orders: Orders, digests: Digests) -> None:
         super().__init__(session, clock)
         self._orders, self._digests = orders, digests
-        self._found: LRUCache[int, _Found | None] = LRUCache(_KEPT)
+        self._found: LRUCache[int, _Reused | None] = LRUCache(_KEPT)
         self._spans = _Spans()
 
     def count(self, study: Study) -> int:
@@ -167,7 +167,7 @@ class Reuse(Part):
             wanted[marked[~whole_lines(study, cases[marked])]] = False
         return bool(wanted.any())
 
-    def _of_study(self, study: Study, number: int) -> _Found | None:
+    def _of_study(self, study: Study, number: int) -> _Reused | None:
         if number not in self._found:
             with self.session.read() as connection:
                 kin, fresh = connection.execute(
@@ -177,7 +177,7 @@ class Reuse(Part):
                 first = 0 if fresh or study.plan is None else latest_place(connection, number)[1]
                 asked = taken(study, np.arange(first, study.cases)) if first else study
                 found = None if fresh else _find(connection, self._spans, asked, kin, number)
-            self._found[number] = found and _Found(found.cases + first, found.studies, found.there)
+            self._found[number] = found and _Reused(found.cases + first, found.studies, found.there)
         return self._found[number]
 
     def forget(self, number: int) -> None:
@@ -257,7 +257,7 @@ def _readable(connection: sa.Connection, query: sa.Select[Any]) -> Iterator[Any]
             raise
 
 
-def _find(connection: sa.Connection, spans: _Spans, study: Study, kin: str, number: int) -> _Found | None:
+def _find(connection: sa.Connection, spans: _Spans, study: Study, kin: str, number: int) -> _Reused | None:
     """Equal cases with rows in any number of studies of the same kin; the newest study with a case counts.
 
     Only rows computed under the fingerprint of this process count. Studies whose cases have keys are found by them,
@@ -273,7 +273,7 @@ def _find(connection: sa.Connection, spans: _Spans, study: Study, kin: str, numb
             search.look_in(candidate)
             if not search.left:
                 break
-    return search.found()
+    return search.reused()
 
 
 class _Search:
@@ -323,7 +323,7 @@ class _Search:
             self._parts.append((ours, source.number, theirs))
             self.left -= ours.size
 
-    def found(self) -> _Found | None:
+    def reused(self) -> _Reused | None:
         """What was taken; None for nothing."""
         if not self._parts:
             return None
@@ -335,7 +335,7 @@ class _Search:
             order = order[whole_lines(self.wanted.study, cases[order])]
             if not order.size:
                 return None
-        return _Found(cases[order], studies[order], np.concatenate([theirs for _, _, theirs in self._parts])[order])
+        return _Reused(cases[order], studies[order], np.concatenate([theirs for _, _, theirs in self._parts])[order])
 
 
 def _has_rows(connection: sa.Connection, source: sa.Row[Any], study: Study, cases: Ints) -> Bools:

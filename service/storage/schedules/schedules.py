@@ -17,7 +17,7 @@ from sprag_study.service.languages import recorded
 from sprag_study.service.storage.deployment import ANY_SCHEDULE
 from sprag_study.service.storage.errors import IdempotencyConflictError, ScheduleNotFoundError, TooManySchedulesError
 from sprag_study.service.storage.part import Part, change_row, micros_of, moment, move_row, optional_moment
-from sprag_study.service.storage.people.audit import by_sender, note, require_edition, require_own
+from sprag_study.service.storage.people.audit import by_sender, note, require_edition, require_owner
 from sprag_study.service.storage.people.pools import pool_of
 from sprag_study.service.storage.schedules.runs import RunRecord, ScheduleRecord, refuse_open_runs, runs_of
 from sprag_study.service.storage.schedules.tables import (
@@ -118,7 +118,7 @@ class Schedules(Part):
         with self.session.write() as connection:
             row = _row(connection, schedule_id)
             number, old = row.number, fields_of(row)
-            require_own("schedule", schedule_id, row.owner)
+            require_owner("schedule", schedule_id, row.owner)
             require_edition("schedule", schedule_id, _record(connection, row).etag, read)
             values = row_values(fields, self.clock.now(), new=fields.timing != old.timing)
             connection.execute(sa.update(SCHEDULES).where(_S.number == number).values(values))
@@ -136,7 +136,7 @@ class Schedules(Part):
         """
         with self.session.write() as connection:
             row = _row(connection, schedule_id)
-            require_own("schedule", schedule_id, row.owner)
+            require_owner("schedule", schedule_id, row.owner)
             require_edition("schedule", schedule_id, _record(connection, row).etag, read)
             note(connection, self._now(), "schedule.delete", schedule_id, name=row.name, owner=row.owner)
             refuse_open_runs(connection, row.number, schedule_id, self._now(), Sentence(recorded.DELETED))

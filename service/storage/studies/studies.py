@@ -41,7 +41,7 @@ from sprag_study.service.storage.part import (
     move_row,
     row_of,
 )
-from sprag_study.service.storage.people.audit import by_sender, note, require_edition, require_own
+from sprag_study.service.storage.people.audit import by_sender, note, require_edition, require_owner
 from sprag_study.service.storage.people.people import STUDY_BYTES, TEXTS, require_queue, size_of_texts
 from sprag_study.service.storage.people.pools import rank_of
 from sprag_study.service.storage.rows.case_keys import KEYED, NOT_YET, TOO_MANY, add_keys
@@ -323,7 +323,7 @@ class Studies(Part):
     def _wish(self, study_id: str, event: StudyEvent) -> StudyRecord:
         with self.session.write() as connection:
             row = row_of(connection, study_id, STUDIES.c.number, *_CHANGED, STUDIES.c.waits_for, *_LEFT)
-            require_own("study", study_id, row.owner)
+            require_owner("study", study_id, row.owner)
             if event is StudyEvent.RESUME and row.waits_for == HELD_AT_DEADLINE:
                 require_queue(connection, MAX_WAITING_STUDIES)
                 self._people.require_quota(connection, (row.most_cases or row.cases) - row.done, 0)
@@ -343,7 +343,7 @@ class Studies(Part):
         """
         with self.session.write() as connection:
             row = row_of(connection, study_id, STUDIES.c.number, *_CHANGED, STUDIES.c.state)
-            require_own("study", study_id, row.owner)
+            require_owner("study", study_id, row.owner)
             number, state = row.number, StudyState(row.state)
             if state.terminal:
                 raise StudyEndedError(f"the study {study_id} is {state.value}: its priority no longer matters")
@@ -423,10 +423,10 @@ class Studies(Part):
         change is meant for; ChangedMeanwhileError for any other.
         """
         c = STUDIES.c
-        with self.session.write_own() as connection:
+        with self.session.write_rows() as connection:
             lock_row(connection, study_id)
             row = row_of(connection, study_id, c.number, c.owner, c.name, c.notes, c.tags, c.search, c.archived_at)
-            require_own("study", study_id, row.owner)
+            require_owner("study", study_id, row.owner)
             require_edition("study", study_id, self._study_record(connection, study_id).etag, read)
             name = row.name if change.name is None else change.name
             notes = row.notes if change.notes is None else change.notes
@@ -473,7 +473,7 @@ class Studies(Part):
             row = connection.execute(sa.select(*RECORD_COLUMNS).where(c.id == study_id, there)).one_or_none()
             if row is None:
                 raise StudyNotFoundError(study_id)
-            require_own("study", study_id, row.owner)
+            require_owner("study", study_id, row.owner)
             require_edition("study", study_id, record_of(row).etag, read)
             state = StudyState(row.state)
             if not state.terminal and row.waits_for != HELD_AT_DEADLINE:
@@ -497,7 +497,7 @@ class Studies(Part):
             if found is None:
                 row_of(connection, study_id, c.number)  # one that is not deleted stays as it is
                 return
-            require_own("study", study_id, found.owner)
+            require_owner("study", study_id, found.owner)
             change_row(connection, found.number, deleted_at=None, purge_at=None)
             note(connection, now, "study.restore", study_id, name=found.name)
 
@@ -512,7 +512,7 @@ class Studies(Part):
         while True:
             with self.session.read() as connection:
                 row = row_of(connection, study_id, c.number, c.model, c.variant, c.state, c.revision, c.cases, c.owner)
-                require_own("study", study_id, row.owner)
+                require_owner("study", study_id, row.owner)
                 follow(StudyState(row.state), StudyEvent.RETRY)
                 counts = failed_cases(connection, row.number, endings)
                 if not counts:

@@ -221,7 +221,7 @@ class Dispatchers(Part):
 
     def heartbeat(self, epoch: int, report: Mapping[str, Any]) -> None:
         """Record that the dispatcher is alive, and the report of its workers (`sprag_study.worker.reports`)."""
-        with self.session.write_own() as connection:
+        with self.session.write_rows() as connection:
             require_epoch(connection, epoch)
             mine = sa.update(DISPATCHERS).where(DISPATCHERS.c.epoch == epoch)
             connection.execute(mine.values(heartbeat_at=self._now(), report=json.dumps(report)))

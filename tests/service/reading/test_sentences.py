@@ -31,7 +31,7 @@ from sprag_study.service.http.problems import as_api_error
 from sprag_study.service.languages import language
 from sprag_study.service.languages.recorded import MANY_STUDIES, NOT_IN_TIME
 from sprag_study.service.reading.quantities import Units
-from sprag_study.service.reading.reader import Phrase, Reading, shown, told
+from sprag_study.service.reading.reader import Phrase, Reading, shown, shown_stored
 from sprag_study.service.storage.errors import StudyNotFoundError
 from sprag_study.service.storage.stored_sentences import read_warnings, write_warnings
 from sprag_study.worker.ports import StoreError
@@ -165,7 +165,7 @@ def test_a_problem_is_a_sentence_in_every_language(error: Exception, english: st
     assert problem is not None
     assert problem.detail == english
     with language("uk"):
-        assert told(problem.detail) == ukrainian
+        assert shown_stored(problem.detail) == ukrainian
 
 
 def test_greek_letters_are_symbols_in_titles() -> None:

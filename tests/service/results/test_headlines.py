@@ -14,7 +14,7 @@ from sprag_study.service.reading.reader import Reading
 from sprag_study.service.results.headlines.along import along_headline
 from sprag_study.service.results.headlines.headline import digits
 from sprag_study.service.results.key_answers import answers_query, find_answers
-from tests.service.results.test_key_answers import Rows, study_of
+from tests.service.results.test_key_answers import Rows, found_in, study_of
 
 READING = Reading("vibration-drive", Units({"rad/s": "rpm", "1": "%"}))
 
@@ -24,8 +24,7 @@ def headline_of(
 ) -> Any:
     study = study_of(spec, **changes)
     rows = Rows(study, flags)
-    found = find_answers(study, answers_query(study), point, rows, rows.whole)
-    return along_headline(study, found, asked=bool(point))
+    return along_headline(study, found_in(study, rows, point), asked=bool(point))
 
 
 def numbers_of(headline: Any) -> dict[str, str]:
@@ -108,7 +107,7 @@ def test_a_missing_mean_is_never_a_number(spec: dict[str, Any]) -> None:
     study = study_of(spec)
     rows = Rows(study)
     rows.values["shaft.speed.mean"] = np.full(study.cases, np.nan)
-    found = find_answers(study, answers_query(study), None, rows, None)
+    found = find_answers(study, answers_query(study), None, rows)
     headline = along_headline(study, replace(found))
     assert "no result" in headline.said(READING)
     assert all(one.label != "No-load speed" for one in headline.numbers)

@@ -15,7 +15,7 @@ from sprag_study.service.figures.answers import answers_figure
 from sprag_study.service.figures.svg import svg
 from sprag_study.service.results.curves import CurveQuery
 from sprag_study.service.results.key_answer_words import answer_facts, note_of, report
-from sprag_study.service.results.key_answers import answers_query, find_answers
+from sprag_study.service.results.key_answers import answers_query, find_answers, find_overall
 from sprag_study.service.spec.document import parse_spec
 from sprag_study.service.storage.studies.records import CaseColumns
 from sprag_study.worker import models
@@ -24,7 +24,7 @@ from tests.service.figures.seen import seen
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from sprag_study.service.results.key_answers import CurveAnswers, Found, StudyAnswers
+    from sprag_study.service.results.key_answers import CurveAnswers, ReadAnswer, StudyAnswers
     from sprag_study.worker.study import Study
 
 #: No-load speed (rad/s) at an amplitude of 1 m, stall torque (N*m).
@@ -74,15 +74,16 @@ def study_of(spec: dict[str, Any], **changes: Any) -> Study:
 
 
 def found_in(study: Study, rows: Rows, point: str | None = None) -> StudyAnswers:
-    return find_answers(study, answers_query(study), point, rows, rows.whole)
+    found = find_answers(study, answers_query(study), point, rows)
+    return replace(found, overall=tuple(find_overall(study, rows.whole)))
 
 
-def only(found: StudyAnswers) -> dict[str, Found]:
+def only(found: StudyAnswers) -> dict[str, ReadAnswer]:
     (curve,) = found.curves
     return by_name(curve)
 
 
-def by_name(curve: CurveAnswers) -> dict[str, Found]:
+def by_name(curve: CurveAnswers) -> dict[str, ReadAnswer]:
     return {item.answer.name: item for item in (*curve.answers, *curve.working_point)}
 
 

@@ -173,7 +173,7 @@ def test_of_a_study_with_several_origins_only_the_rows_of_the_own_one_are_taken(
     store.work.commit(epoch, first, engine(models.chunk_task(study, first.first, first.count)))
     assert store.studies.get(record.id).warnings == ("odd",)
     monkeypatch.setattr(fingerprint, "digest", lambda: "another")
-    monkeypatch.setattr(fingerprint, "own", partial(dict, fingerprint.own(), numpy="0.9"))
+    monkeypatch.setattr(fingerprint, "present", partial(dict, fingerprint.present(), numpy="0.9"))
     Dispatcher(store.work, InlineExecutor(engine), SystemClock()).run(
         lambda: store.studies.get(record.id).state.terminal
     )

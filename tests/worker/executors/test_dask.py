@@ -230,7 +230,7 @@ def test_nothing_is_asked_of_a_connection_that_was_closed(
 def test_a_worker_with_another_numpy_is_refused(
     start: Callable[..., DaskExecutor], caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    executor = start(expected={**fingerprint.own(), "numpy": "0.9"})
+    executor = start(expected={**fingerprint.present(), "numpy": "0.9"})
     eventually(lambda: executor.wait(0.05) or caplog.text.count("is refused") == 2)
     reason = f"is refused: numpy: {np.__version__} instead of 0.9"
     assert reason in caplog.text
@@ -246,9 +246,9 @@ def test_a_worker_with_another_numpy_is_refused(
 
 def test_workers_of_earlier_versions_tell_nothing_of_their_processor() -> None:
     worker = Worker("tcp://a:1", "a")
-    worker.introduced({**fingerprint.own(), "sprag": "0.0.1"}, fingerprint.own())
+    worker.introduced({**fingerprint.present(), "sprag": "0.0.1"}, fingerprint.present())
     assert (worker.usable, worker.processor) == (False, "")
-    assert worker.refusal == f"sprag: 0.0.1 instead of {fingerprint.own()['sprag']}"
+    assert worker.refusal == f"sprag: 0.0.1 instead of {fingerprint.present()['sprag']}"
 
 
 def test_another_process_at_the_address_of_a_worker_runs_nothing(start: Callable[..., DaskExecutor]) -> None:

@@ -43,7 +43,7 @@ from sprag_study.service.views.drives import RibbonQuery, RibbonView
 from sprag_study.service.views.front import FrontView
 from sprag_study.service.views.relatives import asked_by
 from sprag_study.service.views.study_questions import FrontQuestion
-from sprag_study.service.views.study_view import found
+from sprag_study.service.views.study_view import answer_of
 from sprag_study.worker import models
 
 if TYPE_CHECKING:
@@ -151,7 +151,7 @@ def _drawn(
     query: str = "",
 ) -> Chart:
     label = reading.say(title)
-    read = read_figure(view.drawn_in(found(library, study_id, view, chosen), 1), reading)
+    read = read_figure(view.drawn_in(answer_of(library, study_id, view, chosen), 1), reading)
     return Chart(drawn(replace(read, columns=1), label, cases), label, view.about.name, query, list(read.held))
 
 
