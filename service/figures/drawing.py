@@ -22,6 +22,8 @@ Side = Literal["left", "right"]
 _LABEL, _APART = 118.0, 21.0
 #: Symbols that are so near are one above the other.
 _NEAR: Final = 17.0
+#: A letter so far beside its place begins or ends there; a nearer one is centred above or below it.
+_ASIDE: Final = 5.0
 _PRINTED: Final = re.compile(r"<i>(.*)</i>(?:<sub>(.*)</sub>)?")
 _COLOURS: Final = """<style>.drawing text{font:13px sans-serif;fill:#1b2430}
 .drawing .thin,.drawing .dashed,.drawing .leader{fill:none;stroke:#8593a5}.drawing .dashed{stroke-dasharray:9 4 2 4}
@@ -34,13 +36,22 @@ stroke-linecap:round;stroke-linejoin:round}.drawing .mass{fill:#cfe0f2;stroke:#1
 
 @dataclass(frozen=True, slots=True)
 class Dimension:
-    """A number of the machine in its drawing: its path and symbol, its place (px), and the side of its label."""
+    """A number of the machine in its drawing: its path and symbol, its place (px), and the side of its label.
+
+    Attributes
+    ----------
+    apart : from its place to the middle of its letter (px), so that the letter lies on no part of the machine
+    on : what its place moves with: ``arm`` or ``base`` of a drive; of a linkage two joints, the share of the way from
+        the first to the second, and px below that point; "" for nothing
+    """
 
     path: str
     symbol: str
     x: float
     y: float
     side: Side
+    apart: tuple[float, float] | None = None
+    on: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,12 +134,18 @@ def with_leaders(
     sides = rows or (rows_of(drawing, "left"), rows_of(drawing, "right"))
     above = max(max(map(len, sides)) * step - drawing.height, 0.0) / 2
     lines = "".join(
-        f"M{edge:g} {row * step + at - above:g}L{each.x:g} {each.y:g}"
+        _leader(each, edge, row * step + at - above)
         for side, edge in zip(sides, (-gap, drawing.width + gap), strict=True) for row, each in enumerate(side)
     )  # fmt: skip
     text = svg(drawing, links=links)
     place = text.index(">") + 1
-    return text[:place] + (f'<path class="leader" d="{lines}"/>' if lines else "") + text[place:]
+    return text[:place] + lines + text[place:]
+
+
+def _leader(dimension: Dimension, x: float, y: float) -> str:
+    """A line from the label or the field of a dimension to its place, whose end moves with the machine."""
+    moves = f' data-on="{dimension.on}"' if dimension.on else ""
+    return f'<path class="leader"{moves} d="M{x:g} {y:g}L{dimension.x:g} {dimension.y:g}"/>'
 
 
 def _letters(drawing: Drawing, links: Mapping[str, str]) -> str:
@@ -138,11 +155,11 @@ def _letters(drawing: Drawing, links: Mapping[str, str]) -> str:
         if any(abs(each.x - other.x) < _NEAR and abs(each.y - other.y) < _NEAR for other in taken):
             continue
         taken.append(each)
-        left = each.side == "left"
-        end = ' text-anchor="end"' if left else ""
+        across, down = each.apart or (-7.0 if each.side == "left" else 7.0, 0.0)
+        end = ' text-anchor="end"' if across < -_ASIDE else "" if across > _ASIDE else ' text-anchor="middle"'
         text = (
-            f'<text class="letter" data-mark="{escape(each.path)}" x="{each.x + (-7 if left else 7):g}" '
-            f'y="{each.y + 4:g}"{end}>{_printed(each.symbol)}</text>'
+            f'<text class="letter" data-mark="{escape(each.path)}" x="{each.x + across:g}" '
+            f'y="{each.y + down + 4:g}"{end}>{_printed(each.symbol)}</text>'
         )
         link = links.get(each.path)
         found.append(f'<a href="{escape(link)}" tabindex="-1">{text}</a>' if link else text)
@@ -169,7 +186,7 @@ def _beside(drawing: Drawing, labels: Mapping[str, str], links: Mapping[str, str
                 f"{symbol_}{escape(labels[each.path])}</text>"
             )
             found.append(
-                f'<path class="leader" d="M{edge + (4 if side == "left" else -4):g} {y:g}L{each.x:g} {each.y:g}"/>'
+                _leader(each, edge + (4 if side == "left" else -4), y)
                 + (f'<a href="{escape(links[each.path])}">{text}</a>' if each.path in links else text)
             )
     return "".join(found)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -25,6 +26,8 @@ STEP: Final = 5
 #: Largest width and height of a drawing, and its margin.
 _WIDTH, _HEIGHT, _MARGIN = 420.0, 260.0, 24.0
 _ROUNDED: Final = 1
+#: From a bar to the middle of a letter beside it (px).
+_BESIDE: Final = 14.0
 #: Of the train: distance of two shafts, height of its axis, and the largest radius of a wheel (px).
 _APART, _LEVEL, _LARGE = 84.0, 58.0, 30.0
 _STAGES: Final = {
@@ -93,7 +96,7 @@ def _drawing(title: str, sketch: machine_shaft.Sketch, at: str, kind: str, large
         width,
         height,
         "".join(_shapes(sketch, joints, turns, [placed(line) for line in sketch.guides], scale)),
-        tuple(_dimensions(sketch, joints, f"{at}.{kind}.", width)),
+        tuple(_dimensions(sketch, joints, f"{at}.{kind}.", width, scale)),
         json.dumps(frames, separators=(",", ":")),
         at,
     )
@@ -130,21 +133,38 @@ def _shapes(
 
 
 def _dimensions(
-    sketch: machine_shaft.Sketch, joints: dict[str, Floats], prefix: str, width: float
+    sketch: machine_shaft.Sketch, joints: dict[str, Floats], prefix: str, width: float, scale: float
 ) -> Iterator[Dimension]:
-    """The numbers that bars and plates stand for: along each bar, and one below the other in a plate."""
+    """The numbers that bars and plates stand for: along each bar, and one below the other in a plate.
+
+    Their letters are beside the bar, and beside the plate.
+    """
     for bar in sketch.bars:
         first, last = joints[bar.joints[0]][-1], joints[bar.joints[-1]][-1]
         for index, name in enumerate(bar.about):
-            x, y = first + (last - first) * (index + 1.0) / (len(bar.about) + 1.0)
-            yield _at(f"{prefix}{name}", float(x), float(y), width)
+            share = (index + 1.0) / (len(bar.about) + 1.0)
+            x, y = first + (last - first) * share
+            dimension = _at(f"{prefix}{name}", float(x), float(y), width)
+            on = f"{bar.joints[0]} {bar.joints[-1]} {share:.3g} 0"
+            yield replace(dimension, apart=_across(last - first, dimension.side), on=on)
     known = {name for bar in sketch.bars for name in bar.about}
     for plate in sketch.plates:
         x, y = joints[plate.joint][-1]
         own = [name for name in plate.about if name not in known]
         known |= set(own)
+        half = float(np.abs(plate.outline[:, 0]).max()) * scale + _BESIDE / 2
         for index, name in enumerate(own):
-            yield _at(f"{prefix}{name}", float(x), float(y) + 15.0 * index, width)
+            dimension = _at(f"{prefix}{name}", float(x), float(y) + 15.0 * index, width)
+            apart = (-half if dimension.side == "left" else half, 0.0)
+            yield replace(dimension, apart=apart, on=f"{plate.joint} {plate.joint} 0 {15 * index}")
+
+
+def _across(along: Floats, side: str) -> tuple[float, float]:
+    """From a bar to the middle of a letter beside it, on one side (px)."""
+    normal = np.array([-along[1], along[0]]) / max(float(np.hypot(*along)), 1e-9)
+    turned = -1.0 if (normal[0] > 0.0) == (side == "left") else 1.0
+    x, y = normal * turned * _BESIDE
+    return round(float(x), 1), round(float(y), 1)
 
 
 def _at(path: str, x: float, y: float, width: float) -> Dimension:
@@ -180,7 +200,9 @@ def _train(structure: Mapping[str, Any], base: Mapping[str, float]) -> Iterator[
         dimensions.append(Dimension("drive.flywheel.diameter", "", x + 48, _LEVEL + 28, "right"))
     shapes.append(f'<circle class="solid" cx="{end:g}" cy="{_LEVEL:g}" r="4"/>')
     about = gettext("Drawing of the train: from the motor to the shaft of the machine")
-    yield Drawing(gettext("Train"), about, end + 24.0, 2 * _LEVEL, "".join(shapes), tuple(dimensions), at="drive")
+    width = end + 24.0
+    sided = tuple(replace(each, side="left" if each.x < width / 2 else "right") for each in dimensions)
+    yield Drawing(gettext("Train"), about, width, 2 * _LEVEL, "".join(shapes), sided, at="drive")
 
 
 def _line(start: float, end: float) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -61,6 +62,15 @@ def motion_figure(
         motion=True,
         most=_MOST_POINTS,
     )
+
+
+def in_two(figure: Figure, shown: Presentation) -> tuple[Figure, Figure]:
+    """The plots of a motion that the model shows first, and the others, which may be none."""
+    names = shown.first_panels or [panel.y.name for panel in figure.panels]
+    first, others = (
+        tuple(panel for panel in figure.panels if (panel.y.name in names) == wanted) for wanted in (True, False)
+    )
+    return replace(figure, panels=first, columns=1), replace(figure, panels=others)
 
 
 def _along(times: NDArray[np.float64], *, angle: bool) -> NDArray[np.float64]:

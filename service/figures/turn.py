@@ -6,14 +6,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from sprag_study.service.figures.figure import Figure, Line, Panel, Quantity
-from sprag_study.service.figures.motion import motion_figure
+from sprag_study.service.figures.motion import in_two, motion_figure
 from sprag_study.service.reading.reader import Phrase
 
 if TYPE_CHECKING:
     from sprag_study.worker.models import Presentation, Trajectory
 
-#: Panels of a motion that are drawn.
-_PANELS: Final = ("speed", "torque")
 _PERIOD: Final = Quantity(Phrase("excitation period"), "1")
 #: Colour and number of the dash of the lines that are held for comparison.
 _HELD: Final = ("#8493a5", 2)
@@ -32,8 +30,8 @@ def turn_figure(made: Trajectory, frequency: float, shown: Presentation, held: F
     held : Figure, optional
         This figure of another motion, whose lines are drawn behind those of this one.
     """
-    figure = motion_figure(replace(made, times=made.times * frequency), shown)
-    panels = [panel for panel in figure.panels if panel.y.name in _PANELS]
+    figure, _others = in_two(motion_figure(replace(made, times=made.times * frequency), shown), shown)
+    panels = list(figure.panels)
     if held is not None:
         panels = [_with_held(panel, held) for panel in panels]
     return replace(figure, x=_PERIOD, panels=tuple(panels))

@@ -131,6 +131,7 @@ class Presentation:
     checks : first parts of the names of results that describe the computation rather than the machine
     balance : rows of a balance of means: sign, result, label; ``residual`` is the result with the remainder
     panels : plots of a motion, from the names and units of its variables
+    first_panels : titles of the plots of a motion that are shown first; all of them where none is named
     references : further lines of a motion, by the title of their panel
     states : colour and pattern of each state; either alone distinguishes them
     phases : lines of the phase portrait, from the names of the variables: (angle, speed, label)
@@ -162,6 +163,7 @@ class Presentation:
     balance: tuple[tuple[str, str, str], ...] = ()
     residual: str = ""
     panels: Callable[[Sequence[str], Sequence[str]], tuple[Panel, ...]] = panels_by_unit
+    first_panels: tuple[str, ...] = ()
     references: Callable[[Trajectory], Mapping[str, tuple[Reference, ...]]] = _no_references
     states: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     phases: Callable[[Sequence[str]], tuple[tuple[str, str, str], ...]] = _no_phases

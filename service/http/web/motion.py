@@ -12,19 +12,21 @@ from starlette.responses import RedirectResponse, Response
 
 from sprag_study.sentences import Part, Sentence, Whole
 from sprag_study.service.faults import FaultError
-from sprag_study.service.figures.drawings import drawings
+from sprag_study.service.figures.motion import in_two
 from sprag_study.service.figures.read import read_figure
 from sprag_study.service.figures.svg import NARROW, WIDE, picture_svg
 from sprag_study.service.http.context import CaseNumber, StartNumber, StudyId, study_with
 from sprag_study.service.http.drawing import picture, unchanging
 from sprag_study.service.http.language import language_pairs
+from sprag_study.service.http.prefix import here
 from sprag_study.service.http.problems import ApiError, api_error
 from sprag_study.service.http.reading import FileChoice
 from sprag_study.service.http.routers import page_router
 from sprag_study.service.http.threads import in_thread
 from sprag_study.service.http.views import study_address
-from sprag_study.service.http.web.figures.drawn import cases_of
+from sprag_study.service.http.web.figures.drawn import cases_of, drawn
 from sprag_study.service.http.web.figures.live import frames
+from sprag_study.service.http.web.sheet.machine import machine_of_case
 from sprag_study.service.http.web.study import study_frame
 from sprag_study.service.http.web.templates import page, spec_text
 from sprag_study.service.http.web.view_forms import Asked, Seen, asked_of, fact_of, files_of, inline
@@ -64,8 +66,6 @@ if TYPE_CHECKING:
 router = page_router()
 
 _MOTION: Final = CASE_VIEWS["trajectory"]
-#: Panels of a small picture.
-_FEW_PANELS: Final = 2
 #: The part that shows the motion itself in another way.
 _PHASES: Final = "phases"
 #: The views below the motion, in their order.
@@ -110,9 +110,15 @@ def _shown(view: CaseView[Any, Any, Any], answer: CaseAnswer[Any, Any], reading:
     shown = NOTHING_MORE if view.about.name == _MOTION.about.name else view.shown(answer)
     if not view.drawn:
         return Seen(shown=shown)
-    made = inline(view.figure(answer, 2), reading, shown, cases)
+    figure = view.figure(answer, 2)
+    if view.about.name != _MOTION.about.name:
+        return inline(figure, reading, shown, cases)
+    first, others = in_two(figure, models.presentation_of(study))
+    made = inline(first, reading, shown, cases)
+    if others.panels:
+        made = replace(made, others=drawn(read_figure(others, reading), cases=cases))
     motion = answer.result
-    if view.about.name != _MOTION.about.name or not (models.has_clutches(study) and motion.times.size):
+    if not (models.has_clutches(study) and motion.times.size):
         return made
     frequency = {**study.base, **_own(study, case)}["excitation.frequency"]
     return replace(made, frames=frames(replace(motion, times=motion.times - motion.times[0]), frequency))
@@ -202,6 +208,7 @@ def _page(
 ) -> Response:  # fmt: skip
     known, row = models.results_by_name(study), values["row"]
     reading = frame["reading"]
+    variant = here(f"/new?clone={study_id}&case={case}")
     own, address = f"/studies/{study_id}/cases/{case}", f"{study_address(study_id)}/cases/{case}"
     only = [] if which is None else [("start", str(which))]
     main = [known[name] for name in main_results(study)]
@@ -235,7 +242,7 @@ def _page(
         parts={name: view.about.title for name, view in PARTS.items() if view.has(study)},
         opened=[(*one, files[place]) for place, one in enumerate(opened)],
         only=urlencode(only),
-        drawings=drawings(replace(study, base={**study.base, **_own(study, case)})),
+        drawings=machine_of_case(study, frame["study"]["spec"], _own(study, case), reading, variant).drawings,
         spec=spec_text(design_spec(frame["study"]["spec"], study, case)),
         goes_on=models.has_strobes(study) and row is not None and row.ending == "ok",
         has_motion=row is None or row.ending != _NO_MOTION,
@@ -310,11 +317,12 @@ def _number(info: ResultInfo, row: CaseRow) -> KeyNumber:
 
 
 def draw(answer: CaseAnswer[Any, Any], reading: Reading, title: str, small: bool, _form: str) -> bytes:
-    """The motion as a picture of its own; a ``small`` one has its first panels only."""
-    figure = read_figure(_MOTION.figure(answer, 1), reading)
+    """The motion as a picture of its own; a ``small`` one has the panels that the model shows first."""
+    figure = _MOTION.figure(answer, 1)
     if small:
-        return picture_svg(replace(figure, panels=figure.panels[:_FEW_PANELS]), "", width=NARROW).encode()
-    return picture_svg(figure, title, width=WIDE).encode()
+        first, _others = in_two(figure, models.presentation_of(answer.study))
+        return picture_svg(read_figure(first, reading), "", width=NARROW).encode()
+    return picture_svg(read_figure(figure, reading), title, width=WIDE).encode()
 
 
 @router.get("/studies/{study_id:study}/cases/{case:case}/motion.svg")

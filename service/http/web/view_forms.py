@@ -93,10 +93,12 @@ def fact_of(one: KeyNumber, reading: Reading, cases: str = "") -> Fact:
 class Seen:
     """A view as a page shows it: its figure, "" for none, and what people read of it; or a note why there is nothing.
 
-    ``later`` says that the page has to ask for it once more; ``frames`` move the drawing of a machine.
+    ``others`` is what the figure has no room for. ``later`` says that the page has to ask for it once more;
+    ``frames`` move the drawing of a machine.
     """
 
     figure: Markup = EMPTY
+    others: Markup = EMPTY
     shown: Shown = NOTHING
     note: str = ""
     later: bool = False
@@ -111,7 +113,7 @@ def inline(figure: Figure, reading: Reading, shown: Shown, cases: str, *, broad:
     read = read_figure(figure, reading)
     if any(read.below in reading.say(text) for text in shown.sentences):
         read = replace(read, below="")
-    return Seen(drawn(read, cases=cases, broad=broad), shown)
+    return Seen(drawn(read, cases=cases, broad=broad), shown=shown)
 
 
 def asked_of(

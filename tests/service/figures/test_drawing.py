@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 import re
 from dataclasses import replace
 from itertools import pairwise
@@ -52,6 +54,27 @@ def test_the_train_has_a_wheel_for_each_shaft_of_its_stages() -> None:
     assert train.shapes.count('class="wheel"') == 4
     assert {each.path for each in train.dimensions} >= {"drive.stages.0.ratio", "drive.flywheel.mass"}
     assert "mechanism.slider_crank.crank" in {each.path for each in mechanism.dimensions}
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_letters_of_a_mechanism_are_beside_its_bars(name: str) -> None:
+    for drawing in drawings(_study(name)):
+        for each in drawing.dimensions:
+            if drawing.frames:
+                assert each.apart is not None
+                assert math.hypot(*each.apart) > 10.0
+            else:
+                assert f'data-mark="{each.path}"' in svg(drawing, {each.path: "1 mm"})
+
+
+def test_ends_of_lines_know_what_they_move_with() -> None:
+    _train, mechanism = drawings(_study("punching_press"))
+    crank = next(each for each in mechanism.dimensions if each.path.endswith(".crank"))
+    joints = json.loads(mechanism.frames)["joints"]
+    first, last, share, below = crank.on.split()
+    assert {first, last} <= set(joints)
+    assert (float(share), float(below)) == (0.5, 0.0)
+    assert f'class="leader" data-on="{crank.on}"' in svg(mechanism, {crank.path: "20 mm"})
 
 
 @pytest.mark.parametrize("name", preset_names())

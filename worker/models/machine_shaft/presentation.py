@@ -18,13 +18,15 @@ if TYPE_CHECKING:
 
     from sprag_study.engine.outcome import Trajectory
 
+_SPEED: Final = "ω, angular speed"
 _ENERGY: Final = "T, kinetic energy"
 _SQUARES: Final = "S₁ … S₄"
+_TORQUES: Final = "Torques"
 _PANELS: Final = (
-    Panel("ω, angular speed", "rad/s", (("omega", "ω"),)),
+    Panel(_SPEED, "rad/s", (("omega", "ω"),)),
     Panel(_ENERGY, "J", (("energy", "T"),)),
     Panel(_SQUARES, "rad^2/s^2", (("s1", "S₁"), ("s2", "S₂"), ("s3", "S₃"), ("s4", "S₄"))),
-    Panel("Torques", "N*m", (("drive_torque", "driving"), ("resisting_torque", "resisting"))),
+    Panel(_TORQUES, "N*m", (("drive_torque", "driving"), ("resisting_torque", "resisting"))),
 )
 
 
@@ -108,6 +110,7 @@ PRESENTATION: Final = Presentation(
     operating_point=("mean_speed", "drive.inertia"),
     checks=("balance",),
     panels=_panels,
+    first_panels=(_SPEED, _TORQUES),
     references=_references,
     motion="Speed, energy, squares of the speed and torques over the angle of the shaft",
     motion_note="ω² = S₁ + S₂ + S₃ + S₄: shares of the least energy, of the mean energy above it, of the drive's and "

@@ -91,6 +91,7 @@ PRESENTATION: Final = Presentation(
     ),
     residual="balance.energy",
     panels=_panels,
+    first_panels=("speed", "torque"),
     states={
         "free": ("#d9dee5", ""),
         "take_up": ("#f0c35a", "/"),

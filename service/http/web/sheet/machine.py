@@ -6,7 +6,8 @@ Each value leads to its field in the form of a variant, which has the same drawi
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final
 
 from markupsafe import Markup
 
@@ -25,10 +26,13 @@ from sprag_study.worker import models
 from sprag_study.worker.models.formulas import evaluate
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from sprag_study.service.reading.reader import Reading
     from sprag_study.worker.study import Study
+
+#: Width of the drawing of a mechanism between two columns of values (px), which leaves their text legible.
+_WIDTH: Final = 200.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,19 +53,35 @@ def machine_of(
     """
     best = _whole(study, best) if best else best
     shown = replace(study, base={**study.base, **best})
-    ends = _ends(shown)
+    return _drawn(shown, spec, reading, variant, partial(_label, shown, reading, best=best, ends=_ends(shown)))
+
+
+def machine_of_case(
+    study: Study, spec: Mapping[str, Any], own: Mapping[str, float], reading: Reading, variant: str
+) -> Machine:
+    """The machine of a case with the numbers that it has for itself (SI), without tolerances: they are drawn."""
+    shown = replace(study, base={**study.base, **own})
+
+    def label(path: str) -> str:
+        return reading.say(joined("", [Amount(shown.base[path], unit_of(study, path), DIMENSION_DIGITS)]))
+
+    return _drawn(shown, spec, reading, variant, label)
+
+
+def _drawn(
+    study: Study, spec: Mapping[str, Any], reading: Reading, variant: str, label: Callable[[str], str]
+) -> Machine:
     form = models.model_of(study.model).presentation.form
     seen = {item.path: item.origin != "default" for item in inputs(study, spec)
             if item.path in study.base and form.in_sight(item.path)}  # fmt: skip
     links = {path: f"{variant}#{base_pointer(path)}" for path in seen}
     found = []
-    for drawing in drawings(shown):
-        labels = {each.path: _label(shown, reading, each.path, best, ends) for each in drawing.dimensions}
+    for drawing in drawings(study, width=_WIDTH):
+        labels = {each.path: label(each.path) for each in drawing.dimensions}
         drawn = replace(drawing, about=gettext(drawing.about))
         found.append(Markup(svg(drawn, labels, links)))  # noqa: S704 - its texts are escaped
         seen |= dict.fromkeys(labels, False)
-    others = [(reading.caption(path), _label(shown, reading, path, best, ends), links[path])
-              for path, alone in seen.items() if alone]  # fmt: skip
+    others = [(reading.caption(path), label(path), links[path]) for path, alone in seen.items() if alone]
     return Machine(tuple(found), tuple(others))
 
 
@@ -74,7 +94,7 @@ def _whole(study: Study, best: Mapping[str, float]) -> dict[str, float]:
 
 
 def _label(
-    study: Study, reading: Reading, path: str, best: Mapping[str, float], ends: Mapping[str, tuple[float, float]]
+    study: Study, reading: Reading, path: str, *, best: Mapping[str, float], ends: Mapping[str, tuple[float, float]]
 ) -> str:
     """The value at a dimension: the ends of what varies, the width of a tolerance."""
     si = unit_of(study, path)

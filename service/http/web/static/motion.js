@@ -9,7 +9,7 @@ const moved = () => {
 
 document.addEventListener("DOMContentLoaded", async () => {
   moved();
-  const parts = [...document.querySelectorAll(".seen:has(> [data-later])")];
+  const parts = [...document.querySelectorAll(".seen:has([data-later])")];
   if (!parts.length) return;
   const again = new URL(location.href);
   again.searchParams.set("wait", "1");

@@ -2,24 +2,38 @@
 "use strict";
 
 sprag.sheet = (() => {
-  const SECONDS = 3, TURN = 4; // of an excitation period and of a turn of the shaft on the page
+  const SECONDS = 3, TURN = 4, STILL = 7; // of an excitation period and of a turn of the shaft on the page; degrees of a pendulum that is drawn still
   let frames = null, playing = !matchMedia("(prefers-reduced-motion: reduce)").matches, at = 0, began = 0, busy = false, again = false, started = false, answered = "";
   const one = (id) => document.getElementById(id);
   const drawings = () => [...document.querySelectorAll(".picture svg")];
+
+  // The ends of the lines from labels and fields follow what they point at.
+  const follow = (svg, place) => {
+    for (const line of svg.querySelectorAll(".leader[data-on]")) {
+      line.still ||= line.getAttribute("d").match(/-?[\d.]+(?:e-?\d+)?/g).map(Number);
+      const [x, y, ...end] = line.still;
+      line.setAttribute("d", `M${x} ${y}L${place(line.dataset.on, ...end).join(" ")}`);
+    }
+  };
 
   const drive = (step) => {
     drawings().forEach((svg, index) => {
       const pendulum = frames.pendulums[index], wheel = svg.querySelector("[data-clutch]");
       if (!pendulum || !wheel) return;
       svg.classList.add("moving");
-      const [x, y] = [wheel.getAttribute("cx"), wheel.getAttribute("cy")], angle = pendulum.angle[step];
+      const [x, y] = ["cx", "cy"].map((name) => Number(wheel.getAttribute(name))), angle = pendulum.angle[step];
       svg.querySelector("[data-base]").setAttribute("transform", `translate(${frames.x[step]} ${-frames.y[step]})`);
       svg.querySelector("[data-arm]").setAttribute("transform", `rotate(${-angle} ${x} ${y})`);
       svg.querySelector("[data-shaft]").setAttribute("transform", `rotate(${-frames.shaft[step]} ${x} ${y})`);
       wheel.classList.toggle("engaged", pendulum.engaged[step]);
       const spring = svg.querySelector("[data-spring]"), sine = (degrees) => Math.sin(degrees * Math.PI / 180);
+      const [sin, cos] = [sine(STILL - angle), sine(90 + STILL - angle)];
+      follow(svg, (on, a, b) => {
+        const [across, down] = on === "arm" ? [(a - x) * cos - (b - y) * sin, (a - x) * sin + (b - y) * cos] : [a - x, b - y];
+        return [x + across + frames.x[step], y + down - frames.y[step]];
+      });
       if (spring) {
-        const span = Number(spring.dataset.span), moved = Number(spring.dataset.spring) * (sine(angle) - sine(7));
+        const span = Number(spring.dataset.span), moved = Number(spring.dataset.spring) * (sine(angle) - sine(STILL));
         spring.setAttribute("transform", `scale(${Math.max(span - moved, 8) / span} 1)`);
       }
     });
@@ -44,6 +58,10 @@ sprag.sheet = (() => {
       joint.setAttribute("cx", x);
       joint.setAttribute("cy", y);
     }
+    follow(svg, (on) => {
+      const [first, last, share, below] = on.split(" "), [a, b] = [joints[first], joints[last]];
+      return [a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share + Number(below)];
+    });
   };
 
   const show = () => {

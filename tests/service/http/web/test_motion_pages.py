@@ -108,6 +108,32 @@ def test_the_drawing_moves_by_the_slider(visitor: Visitor, motions: str) -> None
     assert page.locator(".picture .engaged").count() in (0, 1)
 
 
+@pytest.mark.parametrize("visitor", [{"java_script_enabled": False}], indirect=True)
+def test_a_case_shows_its_numbers_in_its_drawing_and_two_charts_at_once(visitor: Visitor, motions: str) -> None:
+    page = visitor.page
+    page.goto(f"/studies/{motions}/cases/0?wait=1")
+    drawing = page.locator("#motion .drawing")
+    expect(drawing).to_contain_text("f = 16.5 Hz")
+    expect(drawing.get_by_role("link").first).to_have_attribute(
+        "href", re.compile(r"^/new\?clone=st_\w+&case=0#/base/")
+    )
+    expect(page.locator("#motion svg.figure:visible g.panel")).to_have_count(2)
+    page.get_by_text("Further charts").click()
+    expect(page.locator("#motion svg.figure:visible g.panel")).to_have_count(4)
+
+
+def test_the_lines_from_numbers_follow_the_drawing(visitor: Visitor, motions: str) -> None:
+    page = visitor.page
+    page.goto(f"/studies/{motions}/cases/0?wait=1")
+    page.get_by_role("button", name="Pause").click()
+    line, slider = page.locator('.leader[data-on="arm"]').first, page.locator("#instant")
+    places = set()
+    for part in (0, 0.1, 0.2):
+        slider.evaluate("(e, part) => { e.value = part * e.max; e.dispatchEvent(new Event('input')); }", part)
+        places.add(line.get_attribute("d"))
+    assert len(places) == 3
+
+
 def test_jumps_are_narrowed_by_a_button(visitor: Visitor, swept: str, office: Office) -> None:
     page = visitor.page
     page.goto(f"/studies/{swept}")
