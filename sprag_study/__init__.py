@@ -25,11 +25,13 @@ if TYPE_CHECKING:
         RefusedError,
         ServiceError,
         SpecFileError,
+        StatementError,
         Study,
         StudyTimeoutError,
         UnreachableError,
         compare,
         preset,
+        sql,
         with_units,
     )
     from sprag_study.service.client.machines import Drive, Shaft
@@ -48,11 +50,13 @@ _OF_CLIENT: Final = (
     "RefusedError",
     "ServiceError",
     "SpecFileError",
+    "StatementError",
     "Study",
     "StudyTimeoutError",
     "UnreachableError",
     "compare",
     "preset",
+    "sql",
     "with_units",
 )
 #: What else needs nothing but the base installation, and its modules.
@@ -79,6 +83,7 @@ __all__ = [
     "SpecError",
     "SpecFileError",
     "SpragError",
+    "StatementError",
     "StoreError",
     "Study",
     "StudyTimeoutError",
@@ -89,6 +94,7 @@ __all__ = [
     "preset",
     "run",
     "simulate",
+    "sql",
     "with_units",
 ]
 

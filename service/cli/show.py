@@ -8,7 +8,7 @@ from typing import Any, Final
 import typer
 from typer._click.shell_completion import CompletionItem
 
-from sprag_study.service.cli import case_views, cases, completion, regimes, remote, settle, study_views
+from sprag_study.service.cli import case_views, cases, completion, regimes, remote, settle, sql, study_views
 from sprag_study.service.cli.described import listing
 from sprag_study.service.cli.groups import Groups
 from sprag_study.service.cli.options import SHARED
@@ -51,7 +51,13 @@ app = typer.Typer(
 app.callback()(listing(**SHARED))
 _OF_STUDY, _OF_CASE = N_("Of a study"), N_("Of one case (--case N)")
 _COMMANDS: Final[dict[str, dict[str, Callable[..., None]]]] = {
-    _OF_STUDY: {"state": remote.state, **study_views.COMMANDS, "cases": cases.cases, "rounds": remote.rounds},
+    _OF_STUDY: {
+        "state": remote.state,
+        **study_views.COMMANDS,
+        "cases": cases.cases,
+        "rounds": remote.rounds,
+        "sql": sql.sql,
+    },
     _OF_CASE: {"case": cases.case, **case_views.COMMANDS, "settled": settle.settle, "regimes": regimes.regimes},
 }
 for _title, _commands in _COMMANDS.items():

@@ -20,6 +20,7 @@ from sprag_study.service.client.errors import (
     RefusedError,
     ServiceError,
     SpecFileError,
+    StatementError,
     StudyTimeoutError,
     UnreachableError,
     UntrustedError,
@@ -30,6 +31,7 @@ from sprag_study.service.client.motions import Engagements, Motion
 from sprag_study.service.client.queries import preset
 from sprag_study.service.client.synchronous.client import Client
 from sprag_study.service.client.synchronous.comparing import compare
+from sprag_study.service.client.synchronous.selecting import sql
 from sprag_study.service.client.synchronous.study import Study
 from sprag_study.service.client.tabular import with_units
 from sprag_study.service.client.wire import Query
@@ -48,6 +50,7 @@ __all__ = [
     "RefusedError",
     "ServiceError",
     "SpecFileError",
+    "StatementError",
     "Study",
     "StudyEvent",
     "StudyTimeoutError",
@@ -55,5 +58,6 @@ __all__ = [
     "UntrustedError",
     "compare",
     "preset",
+    "sql",
     "with_units",
 ]

@@ -29,6 +29,13 @@ class ArgumentError(ServiceError, ValueError):
         super().__init__("invalid-parameter", str(fault), [fault])
 
 
+class StatementError(ServiceError, ValueError):
+    """A statement of SQL that does not only read, or that DuckDB refuses; the message has its reason."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__("invalid-parameter", message)
+
+
 class UnreachableError(ServiceError):
     """There was no answer, or not one of the service. ``address`` is the requested address."""
 

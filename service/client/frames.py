@@ -139,15 +139,34 @@ def table_of(parquet: bytes) -> pd.DataFrame:
     """All rows of a study, from its Parquet file, whose metadata have the units."""
     with naming_extra("a table", "tables"):
         import pandas as pd
-        import pyarrow as pa
-        import pyarrow.parquet as pq
+        import pyarrow  # noqa: F401 - pandas uses it
 
-    file = pq.ParquetFile(pa.BufferReader(parquet))
-    fields = [(field.name, (field.metadata or {}).get(b"unit")) for field in file.schema_arrow]
     table = pd.read_parquet(io.BytesIO(parquet))
-    table.attrs["units"] = {name: unit.decode() for name, unit in fields if unit is not None}
+    table.attrs["units"] = units_of(arrow_of(parquet).schema_arrow)
     table.attrs["endings"] = {str(name): int(count) for name, count in table["ending"].value_counts().items()}
     return table
+
+
+def arrow_of(parquet: bytes) -> Any:
+    """The Parquet file of the rows of a study, opened (`pyarrow.parquet.ParquetFile`)."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    return pq.ParquetFile(pa.BufferReader(parquet))
+
+
+def cases_in(parquet: bytes) -> int:
+    """Number of the cases in a Parquet file of rows, of which several can be those of one case."""
+    with naming_extra("a table", "tables"):
+        import pyarrow.compute as pc
+
+    return int(pc.count_distinct(arrow_of(parquet).read(["case"])["case"]).as_py())
+
+
+def units_of(schema: Any) -> dict[str, str]:
+    """The unit of each column of a Parquet file that has one, from the metadata of its fields."""
+    units = ((field.name, (field.metadata or {}).get(b"unit")) for field in schema)
+    return {name: unit.decode() for name, unit in units if unit is not None}
 
 
 def beside(cases: Sequence[CaseDetail]) -> pd.DataFrame:

@@ -64,6 +64,16 @@ def as_polars(frame: pd.DataFrame) -> pl.DataFrame:
     return pl.from_pandas(frame, nan_to_null=True)
 
 
+def from_arrow(table: Any) -> pl.DataFrame:
+    """A table of Arrow as a polars table."""
+    with naming_extra("a polars table", "frames"):
+        import polars as pl
+
+    frame = pl.from_arrow(table)
+    assert isinstance(frame, pl.DataFrame)
+    return frame
+
+
 def with_units(frame: pd.DataFrame) -> pd.DataFrame:
     """A copy of a table of this client whose columns carry the units of ``attrs["units"]``, by pint-pandas.
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Literal, cast, overload
 
 from sprag_study.service.client.asynchronous.comparing import compare
 from sprag_study.service.client.asynchronous.connection import AsyncConnection
 from sprag_study.service.client.asynchronous.naming import schedule_of, study_of
+from sprag_study.service.client.asynchronous.selecting import sql
 from sprag_study.service.client.asynchronous.study import AsyncStudy
 from sprag_study.service.client.queries import finish_text, query_of, spec_of
 from sprag_study.service.client.wire import (
@@ -22,6 +23,9 @@ from sprag_study.service.client.wire import (
 if TYPE_CHECKING:
     from datetime import datetime
     from os import PathLike
+
+    import pandas as pd
+    import polars as pl
 
     from sprag_study.service.answers.catalogue import Health, Model, Preset
     from sprag_study.service.answers.components import ComponentEntry
@@ -135,6 +139,45 @@ class AsyncClient(AsyncConnection):
     ) -> Comparison:
         """Two to ten studies, named as for `study`, side by side, as the function `compare` does."""
         return await compare([AsyncStudy(self, await study_of(self, text)) for text in studies], x, y, by=by, at=at)
+
+    @overload
+    async def sql(
+        self,
+        statement: str,
+        studies: Sequence[str] | Mapping[str, str],
+        *,
+        units: str | None = None,
+        polars: Literal[False] = False,
+    ) -> pd.DataFrame: ...
+
+    @overload
+    async def sql(
+        self,
+        statement: str,
+        studies: Sequence[str] | Mapping[str, str],
+        *,
+        units: str | None = None,
+        polars: Literal[True],
+    ) -> pl.DataFrame: ...
+
+    async def sql(
+        self,
+        statement: str,
+        studies: Sequence[str] | Mapping[str, str],
+        *,
+        units: str | None = None,
+        polars: bool = False,
+    ) -> pd.DataFrame | pl.DataFrame:
+        """What a SELECT of DuckDB gives of several studies, each named as for `study`, as the function `sql` does.
+
+        With a mapping, tables have its names: ``{"before": "latest"}``.
+        """
+        texts = studies if isinstance(studies, Mapping) else dict(enumerate(studies))
+        opened = {name: AsyncStudy(self, await study_of(self, text)) for name, text in texts.items()}
+        named: Any = opened if isinstance(studies, Mapping) else list(opened.values())
+        if polars:
+            return await sql(statement, named, units=units, polars=True)
+        return await sql(statement, named, units=units)
 
     async def workers(self) -> WorkerList:
         """The processes that run cases, by host, and those that are refused, with the reason."""

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Literal, cast, overload
 
 from sprag_study.service.client.asynchronous.part import AsyncStudyPart
-from sprag_study.service.client.frames import beside, grid_of, polars_of, table_of
+from sprag_study.service.client.frames import beside, cases_in, grid_of, polars_of, table_of
 from sprag_study.service.client.queries import form_of, query_of
 from sprag_study.service.client.sketch import Picture
+from sprag_study.service.client.statements import CASES, read_only, selected
 from sprag_study.service.client.wire import case_path, whole_file
 from sprag_study.worker.codes import ENDING_CODES, PENDING
 
@@ -89,10 +90,47 @@ class AsyncStudyTables(AsyncStudyPart):
 
     async def polars(self, units: str | None = None) -> pl.DataFrame:
         """All rows with all results as a polars table, null for missing values; ``units`` as for `table`."""
+        return polars_of(await self._parquet(units))
+
+    @overload
+    async def sql(
+        self, statement: str, *, units: str | None = None, polars: Literal[False] = False
+    ) -> pd.DataFrame: ...
+
+    @overload
+    async def sql(self, statement: str, *, units: str | None = None, polars: Literal[True]) -> pl.DataFrame: ...
+
+    async def sql(
+        self, statement: str, *, units: str | None = None, polars: bool = False
+    ) -> pd.DataFrame | pl.DataFrame:
+        """What a SELECT of DuckDB gives of the table ``cases``, which has the rows and columns of `table`.
+
+        Names with points stand in double quotes: ``select "shaft.load", max("efficiency") from cases group by all``.
+        The statement is executed in this process and only reads; it reaches no files and no network.
+
+        Parameters
+        ----------
+        statement : str
+        units : str, optional
+            As for `table`.
+        polars : bool
+            A polars table, instead of a pandas table whose ``attrs["units"]`` has the unit of each column that keeps
+            its name.
+
+        Raises
+        ------
+        StatementError
+            For a statement that does not only read, or that DuckDB refuses.
+        """
+        read_only(statement)  # before any row is asked for
+        return selected(statement, {CASES: await self._parquet(units)}, polars)
+
+    async def _parquet(self, units: str | None) -> bytes:
+        """All rows as the bytes of a Parquet file, in ``units``; UnreachableError where cases are missing."""
         least = await self._client.ended_cases(self._path)
-        table = polars_of(await self.download("parquet", units))
-        await self._client.require_cases(self._path, least, table["case"].n_unique())
-        return table
+        parquet = await self.download("parquet", units)
+        await self._client.require_cases(self._path, least, cases_in(parquet))
+        return parquet
 
     async def grid(self) -> xr.Dataset:
         """All rows as an xarray grid whose dimensions are the axes, with units as attributes."""

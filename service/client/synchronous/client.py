@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Literal, cast, overload
 
 from sprag_study.service.client.queries import finish_text, query_of, spec_of
 from sprag_study.service.client.synchronous.comparing import compare
 from sprag_study.service.client.synchronous.connection import Connection
 from sprag_study.service.client.synchronous.naming import schedule_of, study_of
+from sprag_study.service.client.synchronous.selecting import sql
 from sprag_study.service.client.synchronous.study import Study
 from sprag_study.service.client.wire import (
     component_path,
@@ -22,6 +23,9 @@ from sprag_study.service.client.wire import (
 if TYPE_CHECKING:
     from datetime import datetime
     from os import PathLike
+
+    import pandas as pd
+    import polars as pl
 
     from sprag_study.service.answers.catalogue import Health, Model, Preset
     from sprag_study.service.answers.components import ComponentEntry
@@ -135,6 +139,45 @@ class Client(Connection):
     ) -> Comparison:
         """Two to ten studies, named as for `study`, side by side, as the function `compare` does."""
         return compare([Study(self, study_of(self, text)) for text in studies], x, y, by=by, at=at)
+
+    @overload
+    def sql(
+        self,
+        statement: str,
+        studies: Sequence[str] | Mapping[str, str],
+        *,
+        units: str | None = None,
+        polars: Literal[False] = False,
+    ) -> pd.DataFrame: ...
+
+    @overload
+    def sql(
+        self,
+        statement: str,
+        studies: Sequence[str] | Mapping[str, str],
+        *,
+        units: str | None = None,
+        polars: Literal[True],
+    ) -> pl.DataFrame: ...
+
+    def sql(
+        self,
+        statement: str,
+        studies: Sequence[str] | Mapping[str, str],
+        *,
+        units: str | None = None,
+        polars: bool = False,
+    ) -> pd.DataFrame | pl.DataFrame:
+        """What a SELECT of DuckDB gives of several studies, each named as for `study`, as the function `sql` does.
+
+        With a mapping, tables have its names: ``{"before": "latest"}``.
+        """
+        texts = studies if isinstance(studies, Mapping) else dict(enumerate(studies))
+        opened = {name: Study(self, study_of(self, text)) for name, text in texts.items()}
+        named: Any = opened if isinstance(studies, Mapping) else list(opened.values())
+        if polars:
+            return sql(statement, named, units=units, polars=True)
+        return sql(statement, named, units=units)
 
     def workers(self) -> WorkerList:
         """The processes that run cases, by host, and those that are refused, with the reason."""

@@ -19,32 +19,14 @@ import pytest
 from anyio.from_thread import BlockingPortal
 
 import sprag_study as sprag
-from sprag_study.here import Here
 from sprag_study.service.client import Client, RefusedError, Study
 from sprag_study.service.settings import Settings
-from sprag_study.service.storage.studies.records import StudyRecord
 from tests.service.calibrating import calibration
+from tests.service.client.conftest import OfService
 from tests.service.conftest import PortalTransport, Service
 from tests.service.searching import search
 
 LOAD, SPEED, FREQUENCY = "shaft.load", "shaft.speed.mean", "excitation.frequency"
-
-
-class OfService(Here):
-    """The database of a service of a test."""
-
-    def run(self, record: StudyRecord) -> StudyRecord:
-        """Nothing: the test fills in the rows."""
-        return record
-
-
-@pytest.fixture
-def pair(service: Service, portal: BlockingPortal, settings: Settings, spec: dict[str, Any]) -> tuple[Study, Study]:
-    """A study of a service, and the same one here."""
-    study_id = service.submit(spec)
-    service.fill(study_id)
-    client = Client("http://localhost", transport=PortalTransport(service.app, portal))
-    return Study(client, study_id), Study(OfService(service.store, settings), study_id)
 
 
 #: What one asks of a study.

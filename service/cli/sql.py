@@ -1,0 +1,101 @@
+"""``sprag show SPEC|ID sql STATEMENT``: SQL over the rows of a study, run here or of a running service."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any
+
+import typer
+
+from sprag_study.service.cli.case_views import SpecOrStudy, is_study, refuse_local, say_file
+from sprag_study.service.cli.common import wants_json
+from sprag_study.service.cli.configured import read_settings
+from sprag_study.service.cli.console import WrongInputError, say, show_table, warning_lines, write_json
+from sprag_study.service.cli.described import parameter, signed
+from sprag_study.service.cli.file_formats import file_format
+from sprag_study.service.cli.files import read_study, write_pieces
+from sprag_study.service.cli.names import study_of
+from sprag_study.service.cli.options import SHARED
+from sprag_study.service.cli.remote import connection
+from sprag_study.service.cli.running import run_parsed
+from sprag_study.service.cli.shown import heading
+
+_Statement = Annotated[
+    str,
+    typer.Argument(
+        metavar="STATEMENT",
+        help="A SELECT of DuckDB over the table `cases`; names with points stand in double quotes.",
+    ),
+]
+
+
+def _sql(
+    study: str, statement: str, file: str | None, units: str | None, db: str | None, processes: int | None
+) -> None:
+    from sprag_study.service.client.errors import StatementError
+    from sprag_study.service.client.statements import CASES, read_only, selected
+
+    form = None if file is None else file_format(file, ("csv",))
+    try:
+        read_only(statement)  # before anything is run
+        frame: Any = selected(statement, {CASES: _rows(study, units, db, processes)}, polars=False)
+    except StatementError as error:
+        raise WrongInputError("invalid-parameter", str(error)) from error
+    heads = [heading(name, frame.attrs["units"].get(name, "1")) for name in frame.columns]
+    rows = [[_plain(cell) for cell in row] for row in frame.astype(object).itertuples(index=False)]
+    if file is not None and form is not None:
+        texts = type(frame)([[_text(cell) for cell in row] for row in rows], columns=heads, dtype=object)
+        write_pieces(file, [texts.to_csv(index=False, lineterminator="\n").encode()])
+        say_file(file, form)
+    if wants_json():
+        columns = [{"name": name, "unit": frame.attrs["units"].get(name)} for name in frame.columns]
+        write_json({"columns": columns, "rows": rows})
+    elif file is None:
+        numeric = [kind.kind in "iuf" for kind in frame.dtypes]
+        show_table("", list(zip(heads, numeric, strict=True)), [[_text(cell) for cell in row] for row in rows])
+
+
+def _plain(cell: Any) -> Any:
+    """A cell as JSON data: None where it has no value, and a text where it is neither number, text nor list."""
+    plain = cell.tolist() if hasattr(cell, "tolist") else cell
+    if isinstance(plain, list | tuple):
+        return [_plain(item) for item in plain]
+    if isinstance(plain, float):
+        return plain if math.isfinite(plain) else None
+    if plain is None or plain != plain:  # noqa: PLR0124 - a missing time
+        return None
+    return plain if isinstance(plain, str | int) else str(plain)
+
+
+def _text(cell: Any) -> Any:
+    """A cell for tables: the items of a list behind each other, as they show flags."""
+    return ", ".join(map(str, cell)) if isinstance(cell, list) else cell
+
+
+def _rows(study: str, units: str | None, db: str | None, processes: int | None) -> bytes:
+    """All rows as a Parquet file: of a study of the service, or of a spec, which is run here first."""
+    if is_study(study):
+        refuse_local(db=db, processes=processes)
+        from sprag_study.service.client import Study
+
+        with connection() as client:
+            return Study(client, study_of(client, study)).download("parquet", units)
+    from sprag_study.service.reading.quantities import SI
+    from sprag_study.service.views.library import Library
+    from sprag_study.service.views.row_files import pieces
+
+    parsed = read_study(study)
+    say(*warning_lines(parsed.warnings))
+    settings = read_settings(database=db, processes=processes)
+    with run_parsed(parsed, settings, lambda _now: "", db=db, processes=processes) as done:
+        return b"".join(pieces(Library(done.store), done.record.id, "parquet", units or SI, "names", ""))
+
+
+sql = signed(
+    _sql,
+    "What a statement of SQL selects from the rows of a study, whose columns are those of its tables.",
+    [
+        parameter("study", SpecOrStudy, ...), parameter("statement", _Statement, ...),
+        *(parameter(name, SHARED[name], None) for name in ("file", "units", "db", "processes")),
+    ],
+)  # fmt: skip
