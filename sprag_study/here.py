@@ -16,8 +16,7 @@ from sprag_study.service.client.synchronous.connection import Connection
 from sprag_study.service.client.wire import plain_body
 from sprag_study.service.exports.decimal_commas import with_commas
 from sprag_study.service.faults import FaultError, choice_of, parameter_error
-from sprag_study.service.figures.pictures import PICTURES
-from sprag_study.service.formats import DECIMALS, FORMATS, HEADERS
+from sprag_study.service.formats import DECIMALS, FORMATS, HEADERS, PICTURES
 from sprag_study.service.http.problems import as_api_error, problem_json
 from sprag_study.service.http.views import case_detail, whole_detail
 from sprag_study.service.jobs import checks

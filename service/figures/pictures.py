@@ -7,13 +7,13 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, Final, cast
 
 from sprag_study.sentences import Sentence
-from sprag_study.service import formats
 from sprag_study.service.faults import refused
 from sprag_study.service.figures.curves import curves_figure
 from sprag_study.service.figures.read import read_figure
 from sprag_study.service.figures.svg import WIDE, as_file, picture_svg
 from sprag_study.service.figures.svg_bars import sensitivity_svg
 from sprag_study.service.figures.svg_map import picture_map
+from sprag_study.service.formats import Picture
 from sprag_study.worker.pool.child_process import uncounted
 
 if TYPE_CHECKING:
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from sprag_study.service.results.curves import Curves, Map
     from sprag_study.service.results.sensitivity import Sensitivity
 
-Picture = formats.Picture
-PICTURES: Final = formats.PICTURES
 MEDIA_TYPES: Final[dict[Picture, str]] = {"svg": "image/svg+xml", "png": "image/png", "pdf": "application/pdf"}
 
 #: Limits of one picture; more would be unreadable.

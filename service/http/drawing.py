@@ -12,7 +12,7 @@ from starlette.responses import Response
 
 from sprag_study.service import languages
 from sprag_study.service.figures import pictures
-from sprag_study.service.formats import MEDIA_TYPES, Format
+from sprag_study.service.formats import MEDIA_TYPES, Format, Picture
 from sprag_study.service.http.respond import entity_tag, not_modified, tagged
 from sprag_study.service.http.threads import in_thread
 from sprag_study.service.http.work import Work
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from sprag_study.service.storage.studies.records import StudyRecord
 
 #: Formats of what is drawn from rows and written as a table too.
-DRAWN_FORMATS: Final = dict[Literal["json", "csv"] | pictures.Picture, str](
+DRAWN_FORMATS: Final = dict[Literal["json", "csv"] | Picture, str](
     [("json", MEDIA_TYPES["json"]), ("csv", MEDIA_TYPES["csv"]), *pictures.MEDIA_TYPES.items()]
 )
 #: Formats of the tables of one case.
@@ -52,7 +52,7 @@ class Drawing:
         return Response(content, media_type=self.media_type, headers=dict(self.headers))
 
 
-def picture(draw: Callable[..., bytes], form: pictures.Picture, *shown: object) -> Drawing:
+def picture(draw: Callable[..., bytes], form: Picture, *shown: object) -> Drawing:
     """A picture, with a policy that disables everything active in it."""
     headers = {"Content-Security-Policy": _PICTURE_POLICY} if form == "svg" else {}
     return Drawing(draw, (*shown, form), pictures.MEDIA_TYPES[form], headers)

@@ -19,7 +19,7 @@ from sprag_study.service.results.defaults import caption, drawn_numbers
 
 if TYPE_CHECKING:
     from sprag_study.service.figures.figure import Figure
-    from sprag_study.service.figures.pictures import Picture
+    from sprag_study.service.formats import Picture
     from sprag_study.service.spec.saved_views import View
     from sprag_study.service.storage.store import Store
     from sprag_study.worker.study import Study

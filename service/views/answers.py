@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from sprag_study.service.answers import key as m
 from sprag_study.service.faults import refused
 from sprag_study.service.figures.answers import answers_figure
-from sprag_study.service.figures.pictures import Picture, require_drawable
+from sprag_study.service.figures.pictures import require_drawable
+from sprag_study.service.formats import Picture
 from sprag_study.service.results.curve_cases import select
 from sprag_study.service.results.curves import CurveQuery
 from sprag_study.service.results.key_answer_words import answers_csv, report

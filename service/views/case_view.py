@@ -24,7 +24,7 @@ from sprag_study.worker.models.starts import motion_of
 if TYPE_CHECKING:
     from sprag_study.service.answers import Value
     from sprag_study.service.figures.figure import Figure
-    from sprag_study.service.figures.pictures import Picture
+    from sprag_study.service.formats import Picture
     from sprag_study.service.storage.store import Store
     from sprag_study.service.views.setting import Offered, ViewInfo
     from sprag_study.worker.models import KernelShape

@@ -13,6 +13,7 @@ from sprag_study.service.figures import pictures
 from sprag_study.service.figures.curves import curves_figure
 from sprag_study.service.figures.pictures import draw_map
 from sprag_study.service.figures.read import read_map
+from sprag_study.service.formats import Picture
 from sprag_study.service.json_text import numbers
 from sprag_study.service.results.choice import held
 from sprag_study.service.results.curve_cases import check_map, drawn_curves, select, stored_curves, stored_map
@@ -134,7 +135,7 @@ class CurvesView(StudyView[CurvesQuestion, CurveQuery, Curves]):
         """A panel for each result."""
         return curves_figure([("", answer.result)], columns)
 
-    def picture(self, answer: CurvesAnswer, reading: Reading, title: str, form: pictures.Picture) -> bytes:
+    def picture(self, answer: CurvesAnswer, reading: Reading, title: str, form: Picture) -> bytes:
         """Not too many curves and points."""
         pictures.require_drawable([answer.result])
         return super().picture(answer, reading, title, form)
@@ -214,6 +215,6 @@ class MapView(StudyView[MapQuestion, tuple[CurveQuery, bool], Map]):
         units = {**drawn.at_units, drawn.x: x_unit, drawn.y: y_unit, result.name: result.unit}
         return exports.read_table(columns, units, reading.units)
 
-    def picture(self, answer: MapAnswer, reading: Reading, title: str, form: pictures.Picture) -> bytes:
+    def picture(self, answer: MapAnswer, reading: Reading, title: str, form: Picture) -> bytes:
         """Colours, or lines of equal value."""
         return draw_map(read_map(answer.result, reading), title, form, contours=answer.chosen[1])

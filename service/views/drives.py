@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 from sprag_study.service.answers import tolerances as m
 from sprag_study.service.faults import parameter_error
-from sprag_study.service.figures.pictures import Picture, draw_map
+from sprag_study.service.figures.pictures import draw_map
 from sprag_study.service.figures.read import read_map
 from sprag_study.service.figures.ribbons import ribbon_figure, ribbon_map, yield_figure, yield_map
+from sprag_study.service.formats import Picture
 from sprag_study.service.results.defaults import drawn_results, main_query, varying_axes
 from sprag_study.service.results.headlines.along import judged_by
 from sprag_study.service.results.selection import axis_name, numeric_names, numeric_results

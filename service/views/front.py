@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 from sprag_study.service.answers import goals as m
 from sprag_study.service.figures.front import front_figure
-from sprag_study.service.figures.pictures import MAX_PICTURE_POINTS, Picture, check_size
+from sprag_study.service.figures.pictures import MAX_PICTURE_POINTS, check_size
+from sprag_study.service.formats import Picture
 from sprag_study.service.results.fronts import Designs, front_csv, front_json, goal_of
 from sprag_study.service.views import study_view
 from sprag_study.service.views.study_questions import FRONT, FrontQuestion

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from sprag_study.service.figures.figure import Figure
-    from sprag_study.service.figures.pictures import Picture
+    from sprag_study.service.formats import Picture
     from sprag_study.service.reading.reader import Reading
     from sprag_study.service.results.sensitivity import Effect
     from sprag_study.service.views.library import Library

@@ -19,7 +19,7 @@ from sprag_study.service.views.shown import NOTHING, Shown
 
 if TYPE_CHECKING:
     from sprag_study.service.figures.figure import Figure
-    from sprag_study.service.figures.pictures import Picture
+    from sprag_study.service.formats import Picture
     from sprag_study.service.reading.reader import Choice, Reading
     from sprag_study.service.views.library import Library
     from sprag_study.service.views.setting import Offered, ViewInfo

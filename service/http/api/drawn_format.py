@@ -8,7 +8,7 @@ from fastapi import Depends, Query, Request
 
 from sprag_study.service import languages
 from sprag_study.service.faults import choice_of
-from sprag_study.service.figures.pictures import PICTURES, Picture
+from sprag_study.service.formats import PICTURES, Picture
 from sprag_study.service.http.api.document import format_query
 from sprag_study.service.http.asked import one_of
 from sprag_study.service.http.drawing import DRAWN_FORMATS

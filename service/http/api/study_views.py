@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from starlette.responses import Response
 
-from sprag_study.service.figures.pictures import PICTURES
+from sprag_study.service.formats import PICTURES
 from sprag_study.service.http.api.document import files, not_modified, problems
 from sprag_study.service.http.api.drawn_format import DrawnFormat
 from sprag_study.service.http.asked import asking

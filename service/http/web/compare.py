@@ -11,9 +11,8 @@ from starlette.responses import Response
 
 from sprag_study.service.answers.differing import MOST_COMPARED
 from sprag_study.service.faults import SelectionError
-from sprag_study.service.figures import pictures
 from sprag_study.service.figures.pictures import draw_compare
-from sprag_study.service.formats import MEDIA_TYPES
+from sprag_study.service.formats import MEDIA_TYPES, Picture
 from sprag_study.service.http import views
 from sprag_study.service.http.context import Context
 from sprag_study.service.http.current import current
@@ -205,7 +204,7 @@ def _answered(
 
 
 @router.get("/compare/picture.{form}")
-async def compare_picture(work: Attended, choice: FileChoice, form: pictures.Picture) -> Response:
+async def compare_picture(work: Attended, choice: FileChoice, form: Picture) -> Response:
     """The chart of a comparison as a file."""
 
     def show(chosen: Comparison, reading: Reading) -> Drawing:

@@ -17,7 +17,7 @@ from sprag_study.service.http.work import Attended
 from sprag_study.service.views.library import reading_of
 
 if TYPE_CHECKING:
-    from sprag_study.service.figures.pictures import Picture
+    from sprag_study.service.formats import Picture
     from sprag_study.service.reading.reader import Choice
     from sprag_study.service.storage.studies.records import StudyRecord
     from sprag_study.service.views.library import Library

@@ -14,8 +14,8 @@ from urllib.parse import urlencode
 from markupsafe import Markup
 
 from sprag_study.service.faults import Fault, FaultError
-from sprag_study.service.figures.pictures import PICTURES
 from sprag_study.service.figures.read import read_figure
+from sprag_study.service.formats import PICTURES
 from sprag_study.service.http.web.figures.drawn import drawn
 from sprag_study.service.languages import gettext
 from sprag_study.service.views.setting import NamedSetting, Offered, ViewInfo, question_of, settings_of
