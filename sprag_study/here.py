@@ -14,7 +14,7 @@ from sprag_study.service.client.errors import RefusedError
 from sprag_study.service.client.events import StudyEvent
 from sprag_study.service.client.synchronous.connection import Connection
 from sprag_study.service.client.wire import plain_body
-from sprag_study.service.exports.decimal_commas import with_commas
+from sprag_study.service.exports.decimal_commas import with_decimals
 from sprag_study.service.faults import FaultError, choice_of, parameter_error
 from sprag_study.service.formats import DECIMALS, FORMATS, HEADERS, PICTURES
 from sprag_study.service.http.problems import as_api_error, problem_json
@@ -143,11 +143,10 @@ class Here(Connection, ABC):
         """What lies at an address, as JSON unless the query has another ``format``."""
         given = dict(query)
         decimal = choice_of("decimal", given.get("decimal", "point"), DECIMALS)
-        if decimal == "point":
-            return self._answer(study_id, part, query)
-        if given.get("format") != "csv":
+        if decimal != "point" and given.get("format") != "csv":
             raise parameter_error("decimal", "not-used", "only CSV has it", decimal, "in csv")
-        return with_commas(self._answer(study_id, part, [item for item in query if item[0] != "decimal"]))
+        answer = self._answer(study_id, part, [item for item in query if item[0] != "decimal"])
+        return with_decimals(answer, decimal)
 
     def _answer(self, study_id: str, part: str, query: Query) -> Iterable[bytes]:
         given, library = dict(query), self.library

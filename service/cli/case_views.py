@@ -9,21 +9,20 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from sprag_study.service import languages
-from sprag_study.service.cli import completion
 from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import ExitCode, WrongInputError, say, write_json, wrong_option
 from sprag_study.service.cli.described import option, parameter, query_of, signed
-from sprag_study.service.cli.file_formats import value_format
+from sprag_study.service.cli.file_formats import require_csv, value_format
 from sprag_study.service.cli.files import output, read_study, require_cases, to_file, write_pieces
 from sprag_study.service.cli.names import study_of
-from sprag_study.service.cli.options import SHARED, ValueFormat, in_language
+from sprag_study.service.cli.options import SHARED, ValueFormat, in_decimals, in_language
 from sprag_study.service.cli.remote import connection
+from sprag_study.service.cli.sources import SpecOrStudy, is_study, refuse_local
 from sprag_study.service.faults import Fault, FaultError, choice_of
 from sprag_study.service.formats import PICTURES
 from sprag_study.service.languages import N_, _
@@ -31,18 +30,11 @@ from sprag_study.service.views.case_questions import CASE_VIEWS, TRANSIENT
 from sprag_study.service.views.setting import NamedSetting, ViewInfo, settings_of
 
 if TYPE_CHECKING:
+    from sprag_study.service.formats import Decimal
     from sprag_study.service.views.case_view import CaseView
     from sprag_study.worker.models.transients import Course
     from sprag_study.worker.study import Study
 
-SpecOrStudy = Annotated[
-    str,
-    typer.Argument(
-        metavar="SPEC|ID",
-        help="Study spec, JSON or TOML, which is run here (- reads standard input); or a study of a running service.",
-        autocompletion=completion.studies,
-    ),
-]
 _EachCase = Annotated[
     bool, typer.Option("--all", help="A row for each case instead: its axes, the outcome and the results.")
 ]
@@ -56,10 +48,11 @@ def command(about: ViewInfo) -> Callable[..., None]:
     def run(
         spec: str, case: int, file: str | None, form: ValueFormat | None, points_file: str | None = None,
         tables: list[str] | None = None, start: int | None = None, every: bool = False, language: str | None = None,
-        **settings: Any,
+        decimal: Decimal | None = None, **settings: Any,
     ) -> None:  # fmt: skip
         written = value_format(form, file, PICTURES if about.pictures else ())
-        drawing = in_language(language)
+        require_csv(None, decimal, written)
+        drawing = [*in_language(language), *in_decimals(decimal)]
         if is_study(spec):
             from sprag_study.service.client.wire import case_path
 
@@ -85,13 +78,13 @@ def command(about: ViewInfo) -> Callable[..., None]:
             require_language(dict(drawing))
             chosen = view.choose(study, case, about.question(**settings))
         if every:
-            _write_all(study, chosen[0], file, lines=written == "json")
+            _write_all(study, chosen[0], file, decimal, lines=written == "json")
         else:
             _write(view, study, case, chosen, start, written, file, dict(drawing))
 
     options = [parameter(one.name, option(one), one.default) for one in asked]
     shared = {"case": 0, **({"start": None} if about.starts else {}), **({} if counted else {"points_file": None})}
-    shared |= {"tables": None, "file": None, "form": None, **({"language": None} if about.pictures else {})}
+    shared |= dict.fromkeys(("tables", "file", "form", "decimal", *(["language"] if about.pictures else [])))
     last = [parameter(name, SHARED[name], default) for name, default in shared.items()]
     last += [parameter("every", _EachCase, False)] if about is TRANSIENT else []
     return signed(run, about.summary, [parameter("spec", SpecOrStudy, ...), *options, *last])
@@ -110,23 +103,6 @@ def say_file(file: str, form: str | None, first: int | None = None) -> None:
 def require_language(drawing: Mapping[str, str]) -> None:
     """Refuse a language of a picture that there is not; FaultError."""
     choice_of("language", drawing.get("language", languages.ENGLISH), languages.available())
-
-
-def refuse_local(**given: Any) -> None:
-    """Refuse what only a spec has; WrongInputError."""
-    options = {"every": "--all", "points_file": "--points", "tables": "--file"}
-    for name, value in given.items():
-        if value is not None and value not in (False, [], ()):
-            reason = N_("belongs to a spec that is run here, not to a study of a service")
-            raise wrong_option(
-                options.get(name, f"--{name}"), "not-used", reason, value if isinstance(value, str) else None
-            )
-
-
-def is_study(spec: str) -> bool:
-    """Whether an argument names a study of a service: it is no file, and not called like a spec."""
-    path = Path(spec)
-    return spec != "-" and path.suffix.lower() not in (".json", ".toml") and not path.is_file()
 
 
 def _check_start(study: Study, start: int | None) -> None:
@@ -163,6 +139,7 @@ def _write(
     file: str | None, drawing: Mapping[str, str],
 ) -> None:  # fmt: skip
     """Compute the view of a case, write it, and say what it has."""
+    from sprag_study.service.exports.decimal_commas import with_decimals
     from sprag_study.service.reading.reader import shown
     from sprag_study.service.views.case_view import drawn, see, written
 
@@ -173,6 +150,7 @@ def _write(
                 content = drawn(view, answer, form)
         else:
             content = written(view, answer, form)
+        content = b"".join(with_decimals([content], drawing.get("decimal")))
         write(content if content.endswith(b"\n") or form in PICTURES else content + b"\n")
     said = view.said(answer)
     if said is not None:
@@ -196,20 +174,24 @@ def _say_written(file: str | None, form: str, case: int, data: Mapping[str, Any]
         write_json({"file": file, "case": case, **data})
 
 
-def _write_all(study: Study, course: Course, file: str | None, *, lines: bool) -> None:
+def _write_all(study: Study, course: Course, file: str | None, decimal: Decimal | None, *, lines: bool) -> None:
     """Write a row for each case; a line of JSON each, or CSV with a line of headings."""
+    from sprag_study.service.exports.decimal_commas import with_decimals
     from sprag_study.service.exports.text import csv_lines
     from sprag_study.service.json_text import to_bytes
     from sprag_study.service.views.transient import case_rows, completed, row_headings
 
     ends: Counter[str] = Counter()
-    with output(file) as write:
+
+    def pieces() -> Iterator[bytes]:
         if not lines:
-            write(csv_lines([row_headings(study)]))
+            yield csv_lines([row_headings(study)])
         for row in case_rows(study, course):
             ends[str(row["outcome"])] += 1
             cells = ["" if value is None else value for value in row.values()]
-            write(to_bytes(row) + b"\n" if lines else csv_lines([cells]))
+            yield to_bytes(row) + b"\n" if lines else csv_lines([cells])
+
+    write_pieces(file, with_decimals(pieces(), decimal))
     text = ", ".join(f"{count} {outcome}" for outcome, count in ends.most_common())
     say(_("{count} cases: {text}", count=study.cases, text=text))
     if set(ends) - {completed(course)}:

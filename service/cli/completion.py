@@ -144,16 +144,19 @@ def _of_study(context: typer.Context, parts: Sequence[str]) -> list[tuple[str, s
 
 def _asked(context: typer.Context, ask: Callable[[Client], list[Offered]]) -> list[Offered]:
     """What the service of the command answers; nothing where none answers."""
-    from sprag_study.service.cli.common import address
+    from sprag_study.service.cli.common import CURRENT, Common, address
     from sprag_study.service.cli.console import CommandFailureError
     from sprag_study.service.client import Client, RefusedError, UnreachableError
 
-    (server, token), given = address(), context.params
+    typed = context.find_root().params
+    before = CURRENT.set(Common(typed.get("server"), typed.get("token")))
     try:
-        with Client(given.get("server") or server, given.get("token") or token, retry=0.0, timeout=_TIMEOUT) as client:
+        with Client(*address(), retry=0.0, timeout=_TIMEOUT) as client:
             return ask(client)
     except (CommandFailureError, RefusedError, UnreachableError, ValueError):  # ValueError: the address of the service
         return []
+    finally:
+        CURRENT.reset(before)
 
 
 def _stored(context: typer.Context, read: Callable[[Store], Sequence[Kept]]) -> Sequence[Kept]:

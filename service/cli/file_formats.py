@@ -51,7 +51,7 @@ def value_format(form: ValueFormat | None, file: str | None, pictures: Sequence[
     return "json" if (wants_json() if form is None else form is ValueFormat.JSON) else "csv"
 
 
-def require_csv(header: Header | None, decimal: Decimal | None, form: str) -> None:
+def require_csv(header: Header | None, decimal: Decimal | None, form: str | None) -> None:
     """Raise WrongInputError for ``--header`` or ``--decimal`` where the file is not CSV."""
     for option, value in (("--header", header), ("--decimal", decimal)):
         if value is not None and form != "csv":

@@ -18,8 +18,8 @@ from sprag_study.service.cli.table_files import named, with_tables
 from sprag_study.service.faults import Fault, Kind
 from sprag_study.service.languages import N_, _
 from sprag_study.service.spec.report import SpecError
-from sprag_study.service.spec.table_text import decoded
 from sprag_study.service.stale_files import mark, sweep
+from sprag_study.service.table_rows import decoded
 from sprag_study.worker.limits import MAX_BODY_BYTES
 
 if TYPE_CHECKING:

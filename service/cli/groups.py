@@ -82,9 +82,12 @@ class Groups(TyperGroup):
     """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Put options before the command behind it, except for those of every command."""
+        """Put options before the command behind it, except for those of every command, which come first."""
+        if ctx.parent is None:  # in a line that is completed they may stand anywhere, too
+            front, rest = common_first(args)
+            return super().parse_args(ctx, [*front, *rest])
         place = next((place for place, word in enumerate(args) if word in self.commands), 0)
-        return super().parse_args(ctx, args if ctx.parent is None else [*args[place:], *args[:place]])
+        return super().parse_args(ctx, [*args[place:], *args[:place]])
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002 - typer's signature
         """Write the name and the first sentence of each command."""
@@ -107,7 +110,10 @@ class Groups(TyperGroup):
 
 
 def common_first(line: Sequence[str]) -> tuple[list[str], list[str]]:
-    """A command line as the options that every command has, wherever they stand, and the command with its own."""
+    """A command line as the options that every command has, wherever they stand, and the command with its own.
+
+    Where the last word is such an option that needs a value, there is no command: what reads the options refuses it.
+    """
     front: list[str] = []
     rest: list[str] = []
     words = iter(line)
@@ -118,7 +124,10 @@ def common_first(line: Sequence[str]) -> tuple[list[str], list[str]]:
         elif name in _ANYWHERE or (not rest and word.startswith("-")):
             front.append(word)
             if not equals and (_ANYWHERE.get(name) or name in _BEFORE):
-                front += [value for value in [next(words, None)] if value is not None]
+                value = next(words, None)
+                if value is None:
+                    return front, []
+                front.append(value)
         else:
             rest.append(word)
     return front, rest

@@ -192,7 +192,7 @@ def run(
     finish_by: FinishBy = None,
 ) -> None:
     """Run a study here, without a service: rows or a report to standard output or FILE, progress on standard error."""
-    from sprag_study.service.exports.decimal_commas import with_commas
+    from sprag_study.service.exports.decimal_commas import with_decimals
     from sprag_study.service.results.unaffected import unaffecting
 
     finish, written = _finish(finish_by), table_format(form, file)
@@ -216,7 +216,7 @@ def run(
         ) as done,
     ):
         pieces = _rows(done, written, header or "names", appendix)
-        for piece in with_commas(pieces) if decimal == "comma" else pieces:
+        for piece in with_decimals(pieces, decimal):
             write(piece)
         record, without_effect = done.record, unaffecting(done.store, done.record)
         progress = done.store.studies.progress(record.id)

@@ -153,6 +153,11 @@ def in_units(units: str | None) -> list[tuple[str, str]]:
     return [] if units is None else [("units", units)]
 
 
+def in_decimals(decimal: Decimal | None) -> list[tuple[str, str]]:
+    """The decimal sign of a file as a query."""
+    return [] if decimal is None else [("decimal", decimal)]
+
+
 def in_language(language: str | None) -> list[tuple[str, str]]:
     """The language of a picture as a query."""
     return [] if language is None else [("language", language)]
@@ -166,6 +171,7 @@ SHARED: Final[dict[str, Any]] = {
     ],
     "form": ValueFormatOption,
     "units": FileUnits,
+    "decimal": CsvDecimal,
     "language": PictureLanguage,
     "case": CaseOption,
     "start": StartOption,

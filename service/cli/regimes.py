@@ -1,11 +1,13 @@
-"""``sprag show SPEC regimes``: the regimes to which one case comes from its many starts, run here."""
+"""``sprag show ID regimes``: the regimes to which one case comes from its many starts, run here."""
 
 from __future__ import annotations
 
 from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import show_table, write_json, wrong_option
-from sprag_study.service.cli.files import read_study, require_cases
-from sprag_study.service.cli.options import CaseOption, PointsFile, SpecFile
+from sprag_study.service.cli.files import require_cases
+from sprag_study.service.cli.options import CaseOption, PointsFile, TableFiles
+from sprag_study.service.cli.remote import study_named
+from sprag_study.service.cli.sources import SpecOrStudy
 from sprag_study.service.languages import N_, _
 
 #: What is shown of each regime.
@@ -15,7 +17,7 @@ _SHOWN = (
 )  # fmt: skip
 
 
-def regimes(spec: SpecFile, case: CaseOption = 0, points_file: PointsFile = None) -> None:
+def regimes(spec: SpecOrStudy, case: CaseOption = 0, points_file: PointsFile = None, tables: TableFiles = None) -> None:
     """The regimes to which one case comes from its many starts, with their shares."""
     import numpy as np
 
@@ -23,7 +25,7 @@ def regimes(spec: SpecFile, case: CaseOption = 0, points_file: PointsFile = None
     from sprag_study.worker.models.starts import has_starts
     from sprag_study.worker.reuse import taken
 
-    study = read_study(spec, points_file).study
+    study = study_named(spec, points_file, tables).study
     require_cases(study, [case])
     if not has_starts(study.run):
         raise wrong_option(

@@ -19,25 +19,29 @@ from sprag_study.service.cli.console import (
     time_text,
     write_json,
 )
-from sprag_study.service.cli.files import naming_points, read_spec
+from sprag_study.service.cli.files import naming_points, read_spec, read_study
 from sprag_study.service.cli.following import show_study, submitted, submitting
 from sprag_study.service.cli.names import study_of
 from sprag_study.service.cli.options import (
     FinishBy,
     Fresh,
+    KeptIn,
     PointsFile,
+    Processes,
     SpecFile,
     StudyId,
     TableFiles,
     Wait,
     WaitTimeout,
 )
+from sprag_study.service.cli.sources import SpecOrStudy, is_study, refuse_local
 from sprag_study.service.faults import Fault, Kind
 from sprag_study.service.languages import _, earlier
 from sprag_study.worker.limits import MAX_BODY_BYTES, MAX_PRIORITY
 
 if TYPE_CHECKING:
     from sprag_study.service.client import Client, RefusedError
+    from sprag_study.service.spec.document import ParsedSpec
 
 #: A parameter as in the service's messages: "by=", "at=shaft.load=0.2".
 _PARAMETER_IN_TEXT = re.compile(r"(?<![\w.-])(x|y|by|at)=(?=(\w?))")
@@ -154,18 +158,36 @@ def submit(
         submitted(client, study, wait, timeout)
 
 
-def state(study_id: StudyId) -> None:
+def state(
+    study_id: SpecOrStudy,
+    points_file: PointsFile = None,
+    tables: TableFiles = None,
+    db: KeptIn = None,
+    processes: Processes = None,
+) -> None:
     """Show the state of a study: how far it is, how it ended, where it runs; of a spec what it would be."""
-    from sprag_study.service.cli.case_views import is_study
     from sprag_study.service.client.wire import study_path
 
     if not is_study(study_id):
         from sprag_study.service.cli.local import check
 
-        check(study_id)
+        check(study_id, points_file, tables, db, processes)
         return
+    refuse_local(points_file=points_file, tables=tables, db=db, processes=processes)
     with connection() as client:
         show_study(client.request("GET", study_path(study_of(client, study_id))))
+
+
+def study_named(text: str, points: str | None, tables: list[str] | None) -> ParsedSpec:
+    """The checked study of a spec file, as `read_study` gives it, or of a study of the service, to be run here."""
+    from sprag_study.service.client.wire import study_path
+    from sprag_study.service.spec.document import parse_spec
+
+    if not is_study(text):
+        return read_study(text, points, files=tables)
+    refuse_local(points_file=points, tables=tables)
+    with connection() as client:
+        return parse_spec(client.request("GET", study_path(study_of(client, text)))["spec"])
 
 
 def rounds(study_id: StudyId) -> None:

@@ -1,4 +1,4 @@
-"""``sprag show SPEC settled``: the settled motions of cases."""
+"""``sprag show ID settled``: the settled motions of cases, of a spec or of a study of a service, run here."""
 
 from __future__ import annotations
 
@@ -10,8 +10,11 @@ import typer
 
 from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import ExitCode, progress_bar, say, show_table, write_json, wrong_option
-from sprag_study.service.cli.files import output, read_study, require_cases, to_file
-from sprag_study.service.cli.options import OutputFile, PointsFile, SpecFile
+from sprag_study.service.cli.file_formats import require_csv
+from sprag_study.service.cli.files import output, require_cases, to_file
+from sprag_study.service.cli.options import CsvDecimal, OutputFile, PointsFile, TableFiles
+from sprag_study.service.cli.remote import study_named
+from sprag_study.service.cli.sources import SpecOrStudy
 from sprag_study.service.json_text import to_bytes
 from sprag_study.service.languages import N_, _
 from sprag_study.worker.limits import MAX_SETTLED_PERIODS, MIN_SETTLED_PERIODS
@@ -29,13 +32,15 @@ _BATCH = 512
 
 
 def settle(
-    spec: SpecFile,
+    spec: SpecOrStudy,
     case: Annotated[
         list[int] | None,
         typer.Option("--case", min=0, metavar="N", help="Number of a case, from 0; may be repeated. Default: all."),
     ] = None,
     points_file: PointsFile = None,
+    tables: TableFiles = None,
     file: OutputFile = None,
+    decimal: CsvDecimal = None,
     at_most: Annotated[
         int | None,
         typer.Option(
@@ -47,19 +52,23 @@ def settle(
 ) -> None:
     """Find the settled motions of cases, with many starts all: regime, order, stability and characteristics."""
     from sprag_study.service.exports import Source, csv_pieces, rows_json
+    from sprag_study.service.exports.decimal_commas import with_decimals
     from sprag_study.worker.models import OK, study_results
     from sprag_study.worker.models.starts import count_of
 
-    study = _settled(read_study(spec, points_file).study, at_most)
+    in_json = wants_json() or (file or "").lower().endswith(".json")
+    require_csv(None, decimal, "json" if in_json else "csv")
+    study = _settled(study_named(spec, points_file, tables).study, at_most)
     cases = _chosen(study, case)
     with output(file) as write:
         blocks = _blocks(study, cases)
-        if wants_json() or (file or "").lower().endswith(".json"):
+        if in_json:
             write(to_bytes([row for block in blocks for row in rows_json(study, block)]) + b"\n")
         elif len(cases) == 1 and not to_file(file):
             _show(blocks[0], count_of(study.run))
         else:
-            for piece in csv_pieces(Source(study, study_results(study), blocks, {})):
+            pieces = csv_pieces(Source(study, study_results(study), blocks, {}))
+            for piece in with_decimals(pieces, decimal):
                 write(piece)
     endings = Counter(ending for block in blocks for ending in block.first_rows().endings)
     regimes = Counter(row.results["regime"] for block in blocks for row in block.rows() if row.ending == OK)

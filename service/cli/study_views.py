@@ -16,22 +16,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, cast
 import typer
 
 from sprag_study.service import languages
-from sprag_study.service.cli.case_views import (
-    SpecOrStudy,
-    is_study,
-    naming_options,
-    refuse_local,
-    require_language,
-    say_file,
-)
+from sprag_study.service.cli.case_views import naming_options, require_language, say_file
 from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.configured import read_settings
 from sprag_study.service.cli.console import WrongInputError, say, warning_lines, write_json, wrong_option
 from sprag_study.service.cli.described import option, parameter, query_of, signed
-from sprag_study.service.cli.file_formats import file_format
+from sprag_study.service.cli.file_formats import file_format, require_csv
 from sprag_study.service.cli.files import MAX_DATA_BYTES, decode, read_bytes, read_study, write_pieces
 from sprag_study.service.cli.names import study_of
-from sprag_study.service.cli.options import SHARED, in_language, in_units
+from sprag_study.service.cli.options import SHARED, in_decimals, in_language, in_units
 from sprag_study.service.cli.remote import connection
 from sprag_study.service.cli.running import run_parsed
 from sprag_study.service.cli.shown import (
@@ -45,6 +38,7 @@ from sprag_study.service.cli.shown import (
     show_sensitivity,
     show_yield,
 )
+from sprag_study.service.cli.sources import SpecOrStudy, is_study, refuse_local
 from sprag_study.service.cli.stores import store_of
 from sprag_study.service.faults import Fault
 from sprag_study.service.formats import PICTURES
@@ -54,12 +48,14 @@ from sprag_study.service.views import study_questions as questions
 from sprag_study.service.views.setting import settings_of
 
 if TYPE_CHECKING:
+    from sprag_study.service.formats import Decimal
     from sprag_study.service.spec.document import ParsedSpec
     from sprag_study.service.storage.studies.records import Progress
     from sprag_study.service.views.setting import NamedSetting, ViewInfo
 
 #: Formats of their files.
 _FORMATS: Final = ("csv", *PICTURES)
+_SHARED: Final = ("file", "units", "decimal", "language", "points_file", "tables", "db", "processes")
 _Measured = Annotated[
     str | None,
     typer.Option("--measured", metavar="FILE", help="CSV file of measured points, instead of those of the spec."),
@@ -107,10 +103,12 @@ def _function_of(command: Command) -> Callable[..., None]:
     asked = settings_of(about.question)
 
     def run(
-        study: str, file: str | None, units: str | None, language: str | None, db: str | None, processes: int | None,
+        study: str, file: str | None, units: str | None, decimal: Decimal | None, language: str | None,
+        db: str | None, processes: int | None, points_file: str | None, tables: list[str] | None,
         measured: str | None = None, **settings: Any,
     ) -> None:  # fmt: skip
         form = None if file is None else file_format(file, _FORMATS)
+        require_csv(None, decimal, form)
         if settings.get("quantiles"):
             settings["quantiles"] = list(map(_probability, settings["quantiles"]))
         whole, most = settings, None
@@ -118,15 +116,16 @@ def _function_of(command: Command) -> Callable[..., None]:
             most = _most_rows(about.question)
             settings = {**settings, "limit": settings["limit"] or command.few}
             whole = {**settings, "limit": most}
-        drawing = dict([*in_units(units), *in_language(language)])
+        drawing = dict([*in_units(units), *in_decimals(decimal), *in_language(language)])
         if is_study(study):
-            refuse_local(measured=measured, db=db, processes=processes)
+            refuse_local(measured=measured, points_file=points_file, tables=tables, db=db, processes=processes)
             opened = _remote(study, about, asked, drawing)
         else:
             if db is not None:
                 store_of(db).close()
             change = None if measured is None else partial(_with_measured, measured)
-            opened = _local(read_study(study, None, change), about, asked, settings, drawing, db, processes)
+            parsed = read_study(study, points_file, change, tables)
+            opened = _local(parsed, about, asked, settings, drawing, db, processes)
         with opened as source:
             found = source.answer(settings)
             if file is not None and form is not None:
@@ -142,7 +141,7 @@ def _function_of(command: Command) -> Callable[..., None]:
         parameter(one.name, option(one), None if one.name == "limit" and command.few else one.default) for one in asked
     ]
     own += [parameter("measured", _Measured, None)] if about is questions.CALIBRATION else []
-    shared = [parameter(name, SHARED[name], None) for name in ("file", "units", "language", "db", "processes")]
+    shared = [parameter(name, SHARED[name], None) for name in _SHARED]
     return signed(run, about.summary, [parameter("study", SpecOrStudy, ...), *own, *shared])
 
 
@@ -203,6 +202,7 @@ def _local(
     drawing: dict[str, str], db: str | None, processes: int | None,
 ) -> Iterator[_Source]:  # fmt: skip
     """The view of the study of a spec, which is run here first."""
+    from sprag_study.service.exports.decimal_commas import with_decimals
     from sprag_study.service.reading.quantities import SI
     from sprag_study.service.reading.reader import CAPTIONS, Choice, reading_for
     from sprag_study.service.views.library import Library
@@ -239,7 +239,7 @@ def _local(
         library, study = Library(done.store), done.store.studies.study(done.record.id)
         yield _Source(
             lambda settings: cast("dict[str, Any]", json.loads(file_of(settings, "json"))),
-            lambda settings, form: [file_of(settings, form)],
+            lambda settings, form: with_decimals([file_of(settings, form)], drawing.get("decimal")),
             lambda: study.model,
         )
 

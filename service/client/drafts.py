@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Self, SupportsFloat, Typ
 
 from sprag_study.service.client.errors import ArgumentError
 from sprag_study.service.client.queries import spec_of
+from sprag_study.service.client.varied import paths_of, without
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -74,7 +75,7 @@ class Draft(Mapping[str, Any]):
         return len(self._spec)
 
     def __repr__(self) -> str:
-        varied = [path for axis in self._axes() for path in _paths(axis)]
+        varied = [path for axis in self._axes() for path in paths_of(axis)]
         parts = [repr(self["name"])] if "name" in self else []
         parts += [f"varies {', '.join(varied)}"] if varied else []
         parts += [kind for kind in ("refine", "goal", "calibrate", "starts", "tolerances") if kind in self]
@@ -100,7 +101,7 @@ class Draft(Mapping[str, Any]):
         for name, value in {**(values or {}), **named}.items():
             path = self.path(name)
             axis = {"path": path, **(value if isinstance(value, Mapping) else {"values": value})}
-            draft = draft._with(axes=[*draft._without(path), axis])
+            draft = draft._with(axes=[*without(draft._axes(), path), axis])
         return draft
 
     def hold(self, values: Mapping[str, Quantity] | None = None, /, **named: Quantity) -> Self:
@@ -109,7 +110,7 @@ class Draft(Mapping[str, Any]):
         for name, value in {**(values or {}), **named}.items():
             path = self.path(name)
             base = _put(draft._spec["base"], path.split("."), value)
-            axes = draft._without(path)
+            axes = without(draft._axes(), path)
             draft = self._begun({**draft._spec, "base": base, "axes": axes})
             if not axes:  # which some kinds of studies must not have
                 del draft._spec["axes"]
@@ -134,17 +135,6 @@ class Draft(Mapping[str, Any]):
 
     def _axes(self) -> list[Any]:
         axes: list[Any] = self._spec.get("axes", [])
-        return axes
-
-    def _without(self, path: str) -> list[Any]:
-        """The axes without a parameter; those that it shares with others are theirs alone."""
-        axes = []
-        for axis in self._axes():
-            paths = [other for other in _paths(axis) if other != path]
-            if paths == _paths(axis):
-                axes.append(axis)
-            elif paths:
-                axes.append({**axis, "path": paths if len(paths) > 1 else paths[0]})
         return axes
 
     def _entries(self, entries: Entries | None, alone: str) -> list[dict[str, Any]] | None:
@@ -185,11 +175,6 @@ def _result(name: str, wanted: Any) -> dict[str, Any]:
 def _condition(text: str) -> dict[str, Any]:
     parts = _CONDITION.fullmatch(text.strip())
     return {"result": text} if parts is None else {"result": parts[1], _RELATIONS[parts[2]]: parts[3]}
-
-
-def _paths(axis: Mapping[str, Any]) -> list[str]:
-    path = axis.get("path", [])
-    return [path] if isinstance(path, str) else list(path)
 
 
 def _expanded(base: Any, pattern: Sequence[str], before: str = "") -> Iterator[str]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from sprag_study.service.answers import filled
 from sprag_study.service.answers.people import AuditEntry
-from sprag_study.service.exports.text import csv_lines
+from sprag_study.service.exports.text import typed_lines
 from sprag_study.service.json_text import to_bytes
 from sprag_study.service.spec.csv_text import escape
 
@@ -35,10 +35,10 @@ def audit_pieces(records: Iterable[AuditRecord], form: AuditFormat) -> Iterator[
     """The rows as CSV, with a header, or as one JSON object per line."""
     rest = map(entry_json, records)
     if form == "csv":
-        yield csv_lines([list(AuditEntry.__annotations__)])
+        yield typed_lines([list(AuditEntry.__annotations__)])
     while piece := list(islice(rest, _PIECE)):
         if form == "csv":
-            yield csv_lines([[_cell(value) for value in entry.values()] for entry in piece])
+            yield typed_lines([[_cell(value) for value in entry.values()] for entry in piece])
         else:
             yield b"".join(to_bytes(entry) + b"\n" for entry in piece)
 

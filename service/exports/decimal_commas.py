@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import codecs
-import csv
-import io
 import re
 from collections.abc import Iterable, Iterator
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-#: A cell can hold a whole spec; csv takes 131,072 characters unless told otherwise.
-csv.field_size_limit(2**27)
-_NUMBER: Final = re.compile(r"-?\d+\.\d+(?:e[+-]?\d+)?", re.IGNORECASE)
+from sprag_study.service.exports.text import DECIMAL_NUMBER
+
+if TYPE_CHECKING:
+    pass
+
+#: A cell, and what ends it. What looks like a number and is a text has quotes (`sprag_study.service.exports.text`).
+_CELL: Final = re.compile(r'("(?:[^"]|"")*"|[^",\n]*)(,|\n)')
 
 
 class DecimalCommas:
@@ -23,15 +25,19 @@ class DecimalCommas:
     def feed(self, piece: bytes, *, last: bool = False) -> bytes:
         """The lines that are complete with ``piece``, which may end anywhere; all that is left with the ``last``."""
         text = self._rest + piece
+        if last and text and not text.endswith(b"\n"):
+            text += b"\n"
         end = len(text) if last else _end_of_lines(text)
         lines, self._rest = text[:end], text[end:]
         if not lines:
             return b""
-        out = io.StringIO()
-        rows = csv.reader(io.StringIO(lines.decode("utf-8"), newline=""))
-        csv.writer(out, delimiter=";", lineterminator="\n").writerows(map(_with_commas, rows))
         mark, self._mark = self._mark, b""
-        return mark + out.getvalue().encode("utf-8")
+        return mark + _CELL.sub(_with_comma, lines.decode("utf-8")).encode("utf-8")
+
+
+def with_decimals(pieces: Iterable[bytes], decimal: str | None) -> Iterable[bytes]:
+    """A whole CSV file with a decimal sign, piece by piece; points are left as they are."""
+    return with_commas(pieces) if decimal == "comma" else pieces
 
 
 def with_commas(pieces: Iterable[bytes]) -> Iterator[bytes]:
@@ -42,8 +48,11 @@ def with_commas(pieces: Iterable[bytes]) -> Iterator[bytes]:
     yield commas.feed(b"", last=True)
 
 
-def _with_commas(row: list[str]) -> list[str]:
-    return [cell.replace(".", ",") if _NUMBER.fullmatch(cell) else cell for cell in row]
+def _with_comma(cell: re.Match[str]) -> str:
+    text, end = cell[1], ";" if cell[2] == "," else cell[2]
+    if DECIMAL_NUMBER.fullmatch(text):
+        return text.replace(".", ",") + end
+    return f'"{text}"{end}' if ";" in text and text[0] != '"' else text + end
 
 
 def _end_of_lines(text: bytes) -> int:

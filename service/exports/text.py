@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from sprag_study.service.exports.source import machine
 from sprag_study.service.json_text import to_bytes
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
     from sprag_study.service.storage.studies.records import CaseRow, RowBlock
     from sprag_study.worker.study import Study
 
-#: Spreadsheets interpret cells that begin with these characters as formulas.
+#: A cell that decimal commas apply to.
+DECIMAL_NUMBER: Final = re.compile(r"-?\d+\.\d+(?:e[+-]?\d+)?", re.IGNORECASE)
 
 
 def row_json(row: CaseRow, parameters: dict[str, Value]) -> Case:
@@ -103,7 +105,7 @@ def csv_pieces(source: Source) -> Iterator[bytes]:
 def table_csv(header: Iterable[str], columns: Iterable[Iterable[object]]) -> bytes:
     """A small table given by its columns, as CSV with the same cells as `csv_pieces`."""
     rows = ([_cell(value) for value in row] for row in zip(*columns, strict=True))
-    return csv_lines(chain([list(header)], rows))
+    return typed_lines(chain([list(header)], rows))
 
 
 def stacked(parts: Iterable[Mapping[str, Sequence[Any]]]) -> dict[str, list[Any]]:
@@ -133,14 +135,25 @@ def _headed(name: str, unit: str, known: str) -> str:
     return name if unit in (known, "") else f"{name} [{unit}]"
 
 
-def _cell(value: object) -> str:
+def _cell(value: object) -> object:
     if value is None or value != value:  # noqa: PLR0124 - NaN
         return ""
-    return repr(value) if isinstance(value, float) else escape(str(value)) if isinstance(value, str) else str(value)
+    return escape(str(value)) if isinstance(value, str) else value
 
 
 def csv_lines(rows: Iterable[Iterable[object]]) -> bytes:
-    """The rows as lines of CSV."""
+    """The rows as lines of CSV, of numbers and of texts that cannot look like one."""
     buffer = io.StringIO()
     csv.writer(buffer, lineterminator="\n").writerows(rows)
+    return buffer.getvalue().encode("utf-8")
+
+
+def typed_lines(rows: Iterable[Sequence[object]]) -> bytes:
+    """The rows as lines of CSV; a text that looks like a number has quotes, and so have the others of its row."""
+    buffer = io.StringIO()
+    plain = csv.writer(buffer, lineterminator="\n")
+    quoted = csv.writer(buffer, lineterminator="\n", quoting=csv.QUOTE_NONNUMERIC)
+    for row in rows:
+        texts = any(isinstance(cell, str) and DECIMAL_NUMBER.fullmatch(cell) for cell in row)
+        (quoted if texts else plain).writerow(row)
     return buffer.getvalue().encode("utf-8")

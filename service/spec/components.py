@@ -25,7 +25,7 @@ from sprag_study.service.spec.described import Record
 from sprag_study.service.spec.labels import LINES_ALLOWED, printable_lines
 from sprag_study.service.spec.node import Node, exact
 from sprag_study.service.spec.report import Report, SpecError
-from sprag_study.service.spec.table_text import heading_of
+from sprag_study.service.table_rows import heading_of
 from sprag_study.worker import models
 from sprag_study.worker.limits import MAX_COMPONENTS, MAX_NAME_LENGTH, MAX_NOTES_LENGTH
 from sprag_study.worker.models.form import ComponentKind

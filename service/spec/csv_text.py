@@ -19,7 +19,8 @@ from sprag_study.service.reading.texts import shorten_text
 from sprag_study.service.reading.together import AMBIGUOUS_UNIT, questions
 from sprag_study.service.reading.units import QuantityError, to_float
 from sprag_study.service.spec.node import exact
-from sprag_study.service.spec.table_text import MAX_HEADING, CsvRow, Split, settled_table, split, with_units
+from sprag_study.service.spec.table_text import settled_table, with_units
+from sprag_study.service.table_rows import MAX_HEADING, CsvRow, Split, split
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence

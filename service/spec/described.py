@@ -35,6 +35,10 @@ _IN_ONE_TEXT: Final[Schema] = {
 }
 
 
+#: Texts that are read as plain numbers: those that pages print, such as 1·10⁻⁹.
+_PRINTED: Final[Schema] = {"pattern": "[^\\x00-\\x7F]"}
+
+
 @dataclass(frozen=True, slots=True)
 class Described:
     """One field.
@@ -105,8 +109,8 @@ class Described:
             return {"enum": list(self.values), **schema}
         if self.kind == "flag":
             return {"type": "boolean", **schema}
-        kind = "integer" if self.kind == "whole" else ["number", "string"]
-        return {"type": kind, "minimum": self.low, "maximum": self.high, **schema}
+        kind = {"type": "integer"} if self.kind == "whole" else {"type": ["number", "string"], **_PRINTED}
+        return {**kind, "minimum": self.low, "maximum": self.high, **schema}
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,14 +25,8 @@ from sprag_study.service.languages import N_
 from sprag_study.service.reading.numbers import WITHOUT_DOUBT, assumption, is_ambiguous, of_line, parse_number, question
 from sprag_study.service.reading.units import QuantityError, parse_exact, to_float
 from sprag_study.service.spec.csv_text import not_csv
-from sprag_study.service.spec.table_text import (
-    CsvRow,
-    Split,
-    lines_of,
-    settled_table,
-    split,
-    with_units,
-)
+from sprag_study.service.spec.table_text import settled_table, with_units
+from sprag_study.service.table_rows import CsvRow, Split, lines_of, split
 from sprag_study.worker.limits import MAX_CLUTCH_ROWS
 
 #: Most faults reported for one file; a file of another kind would have one in every line.

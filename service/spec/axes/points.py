@@ -12,7 +12,7 @@ from sprag_study.service.spec.axes.blocks import Block
 from sprag_study.service.spec.csv_text import Column, read_columns, read_csv
 from sprag_study.service.spec.described import Record
 from sprag_study.service.spec.node import Node
-from sprag_study.service.spec.table_text import heading_of
+from sprag_study.service.table_rows import heading_of
 from sprag_study.worker.limits import MAX_AXIS_VALUES, MAX_COLUMNS
 
 POINTS: Final = Record(

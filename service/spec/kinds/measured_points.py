@@ -15,7 +15,7 @@ from sprag_study.service.reading.texts import did_you_mean, shorten_text
 from sprag_study.service.reading.units import QuantityError, parse_quantity
 from sprag_study.service.spec.csv_text import Column, read_columns, read_csv, refuse_cell, refuse_mixed_column
 from sprag_study.service.spec.node import Node
-from sprag_study.service.spec.table_text import CsvRow, heading_of
+from sprag_study.service.table_rows import CsvRow, heading_of
 from sprag_study.worker.planning.calibrate.plan import MOST_MEASURED, Measured
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from sprag_study.service.reading.numbers import is_ambiguous, parse_number
 from sprag_study.service.reading.units import AmbiguousCommaError, QuantityError, has_unit, parse_exact, to_float
 from sprag_study.service.spec.csv_text import Column, in_cell, read_csv, refuse_mixed_column
 from sprag_study.service.spec.node import Node, exact
-from sprag_study.service.spec.table_text import heading_of
+from sprag_study.service.table_rows import heading_of
 from sprag_study.worker.models import Parameter, machine_shaft
 
 #: The end of a heading that may be a unit: ``angle_deg``, ``angle deg``, ``angle / deg``.

@@ -136,6 +136,13 @@ def test_options_are_completed(
         assert offers("models", "") == [m["name"] for m in service.get("/models")["models"]]
         assert offers("list", "--model", "m") == ["machine-shaft"]
     assert offers("show", study, "cases", "--sort", "shaft") == [], "no service answers"
+    with served(service.app) as address:
+        typed = "--server", address
+        assert offers(*typed, "study", "watch", "fee") == ["feeder"], "the service that is typed answers"
+        assert offers("study", *typed, "watch", "fee") == ["feeder"]
+        assert offers("list", *typed, "--json", "--model", "m") == ["machine-shaft"]
+        assert offers("show", study, "cases", *typed, "--sort", "shaft.l") == ["shaft.load"]
+    assert offers("list", "--server", "h") == []
     assert offers("show", study, "cases", "--ending", "c") == [
         "chatter",
         "cannot_assemble",

@@ -10,8 +10,10 @@ import pytest
 import typer
 
 from sprag_study.service import languages
-from sprag_study.service.cli import case_views, study_views
+from sprag_study.service.cli import case_views, remote, study_views
+from sprag_study.service.cli import sources as of_commands
 from sprag_study.service.cli.app import command_line
+from sprag_study.service.exports.decimal_commas import with_commas
 from sprag_study.service.views.answers import AnswersView
 from sprag_study.service.views.case_questions import CASE_VIEWS
 from sprag_study.service.views.cases import CASE_VIEWS as VIEWS_OF_CASES
@@ -87,6 +89,51 @@ def test_views_of_a_case(sprag: Callable[..., Finished], sources: tuple[Path, st
     assert (refused.code, "a name that ends in .csv, .json" in refused.err) == (2, True)
     refused = sprag("show", sources[1], "transient", "--kind", "run-up", "--all")
     assert (refused.code, "--all: belongs to a spec" in refused.err) == (2, True)
+
+
+def test_tables_have_decimal_commas_where_they_are_asked_for(
+    sprag: Callable[..., Finished], sources: tuple[Path, str], tmp_path: Path
+) -> None:
+    for name, options in (("curves", ()), ("strobes", ("--case", 1))):
+        tables = []
+        for number, source in enumerate(sources):
+            file = tmp_path / f"{number}.csv"
+            plain = sprag("show", source, name, *options, "-o", file).code, file.read_bytes()
+            commas = sprag("show", source, name, *options, "-o", file, "--decimal", "comma").code, file.read_bytes()
+            assert (plain[0], commas) == (0, (0, b"".join(with_commas([plain[1]]))))
+            tables.append(commas)
+        assert tables[0] == tables[1]
+        refused = sprag("show", sources[0], name, *options, "-o", tmp_path / "a.svg", "--decimal", "comma")
+        assert (refused.code, "--decimal: only CSV files have it" in refused.err) == (2, True)
+    file = tmp_path / "settled.csv"
+    assert sprag("show", sources[0], "settled", "--case", 1, "-o", file, "--decimal", "comma").code == 0
+    assert file.read_text("utf-8-sig").splitlines()[1].startswith("1;0,1;")
+
+
+def test_a_spec_takes_its_points_without_a_view_too(
+    sprag: Callable[..., Finished], sources: tuple[Path, str], tmp_path: Path, connected: Callable[[ModuleType], None]
+) -> None:
+    connected(remote)
+    points = tmp_path / "points.csv"
+    points.write_text("shaft.load [N*mm]\n50\n75\n")
+    done = sprag("show", sources[0], "--points", points)
+    assert (done.code, "valid, 2 cases" in done.out) == (0, True), done.err
+    done = sprag("show", sources[0], "curves", "--points", points, "--y", "shaft.speed.mean", "--json")
+    assert json.loads(done.out)["curves"][0]["x"] == [0.05, 0.075]
+    done = sprag("show", sources[1], "--points", points)
+    assert (done.code, "--points: belongs to a spec" in done.err) == (2, True)
+
+
+def test_motions_that_settle_are_those_of_a_study_too(
+    sprag: Callable[..., Finished], sources: tuple[Path, str], service: Service, connected: Callable[[ModuleType], None]
+) -> None:
+    connected(remote)
+    here, there = (sprag("show", source, "settled", "--case", 1, "--json") for source in sources)
+    assert (here.code, json.loads(here.out)) == (there.code, json.loads(there.out))
+    starts = {"count": 2, "ranges": {"shaft.initial_speed": ["0 rad/s", "30 rad/s"]}}
+    spec = {**_SMALL, "run": {"until": "settled"}, "starts": starts}
+    done = sprag("show", service.submit(spec), "regimes", "--case", 1, "--json")
+    assert (done.code, sum(row["regime.share"] for row in json.loads(done.out)["regimes"])) == (0, 1.0), done.err
 
 
 def _answer(done: Finished) -> dict[str, Any]:
@@ -195,4 +242,4 @@ def test_an_argument_is_a_study_or_a_spec(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "folder").mkdir()
     (tmp_path / "spec").write_text("{}")
-    assert case_views.is_study(argument) is study
+    assert of_commands.is_study(argument) is study

@@ -111,6 +111,13 @@ def test_common_options_stand_anywhere() -> None:
     assert common_first(["list", "--", "--json"]) == ([], ["list", "--", "--json"])
 
 
+@pytest.mark.parametrize("option", ["--token", "--server", "--language"])
+def test_a_common_option_without_its_value_is_refused(sprag: Sprag, option: str) -> None:
+    for line in (("list", option), (option,)) if option != "--language" else ((option,),):
+        done = sprag(*line)
+        assert (done.code, f"Option '{option}' requires an argument." in done.err) == (2, True), done.err
+
+
 def test_a_study_is_named_before_or_behind_the_view(sprag: Sprag, tmp_path: Path) -> None:
     spec = tmp_path / "absent.json"
     for words in (("show", spec, "curves"), ("show", "curves", spec), ("show", "curves", "--x", "a", spec)):

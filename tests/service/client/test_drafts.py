@@ -98,6 +98,28 @@ def test_what_is_held_leaves_a_shared_axis_to_the_others() -> None:
     assert draft["base"]["excitation"]["amplitude_x"] == "1 mm"
 
 
+def test_what_is_held_leaves_points_samples_and_groups() -> None:
+    points = {"points": "excitation.frequency [Hz],shaft.load [N*mm]\n25,100\n26,150\n"}
+    base = {"sprag": 1, "model": "vibration-drive", "base": drive()["base"]}
+    draft = sprag.Drive.of({**base, "axes": [points]})
+    assert repr(draft) == "Drive(varies excitation.frequency, shaft.load)"
+    held = draft.hold(load="0.3 N*m")
+    assert held["axes"] == [{"points": "excitation.frequency [Hz]\n25\n26\n"}]
+    assert cases(held) == 2
+    assert "axes" not in held.hold(frequency="25 Hz")
+    assert cases(draft.vary(load=[0.1, 0.2, 0.3])) == 6
+    commas = sprag.Drive.of({**base, "axes": [{"points": "shaft.load, excitation.frequency\n0,5, 20,25\n1,5, 21,5\n"}]})
+    (held_points,) = commas.hold(load=0.1)["axes"]
+    assert held_points == {"points": "sep=;\nexcitation.frequency\n20,25\n21,5\n"}
+    assert cases(commas.hold(load=0.1)) == 2
+    ranges = [{"path": path, "from": 0.1, "to": 0.2} for path in ("shaft.load", "excitation.amplitude_y")]
+    sample = {"sample": "sobol", "count": 4, "ranges": ranges}
+    group = {"combine": "zip", "axes": [sample]}
+    held = sprag.Drive.of({**base, "axes": [group]}).hold(load=0.1)
+    assert held["axes"] == [{"combine": "zip", "axes": [{**sample, "ranges": ranges[1:]}]}]
+    assert "axes" not in held.hold(amplitude_y="1 mm")
+
+
 def test_a_part_that_is_not_there_is_refused() -> None:
     with pytest.raises(ArgumentError, match="a place from 0 to 0"):
         drive(1).hold({"pendulums.1.mass": "0.4 kg"})

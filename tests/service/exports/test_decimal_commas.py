@@ -14,7 +14,10 @@ from anyio.from_thread import BlockingPortal
 
 import sprag_study as sprag
 from sprag_study.service.client import Client, RefusedError
+from sprag_study.service.exports.components import components_csv
 from sprag_study.service.exports.decimal_commas import DecimalCommas, with_commas
+from sprag_study.service.exports.text import table_csv
+from sprag_study.service.spec.components import Component
 from tests.service.conftest import API, PortalTransport, Service
 from tests.sprag_study.test_library import SPEC
 
@@ -34,6 +37,18 @@ def test_lines_do_not_wait_for_the_last_piece() -> None:
     assert commas.feed(b"a,b\n1.5,") == b"\xef\xbb\xbfa;b\n"
     assert commas.feed(b"2\n") == b"1,5;2\n"
     assert commas.feed(b"3", last=True) == b"3\n"
+
+
+def test_texts_that_look_like_numbers_are_left_as_they_are() -> None:
+    table = table_csv(["name", "load"], [["1.5", "clutch 2.5", "2"], [0.5, 1.5, -2.5e-07]])
+    assert b"".join(with_commas([table])) == (b'\xef\xbb\xbfname;load\n"1.5";0,5\nclutch 2.5;1,5\n2;-2,5e-07\n')
+    assert list(csv.reader(io.StringIO(table.decode()))) == [
+        ["name", "load"], ["1.5", "0.5"], ["clutch 2.5", "1.5"], ["2", "-2.5e-07"],
+    ]  # fmt: skip
+    own = components_csv([Component("spring", "1.5", "2.5", {"spring_rate": "0.25", "damping": "0.5 N*m*s/rad"})])
+    name, note, *rest = b"".join(with_commas([own])).decode("utf-8-sig").splitlines()[1].split(";")[1:]
+    assert (name, note) == ('"1.5"', '"2.5"')
+    assert "0,25" in rest
 
 
 def test_a_study_run_here_has_them(tmp_path: Path) -> None:

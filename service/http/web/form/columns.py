@@ -14,13 +14,8 @@ from sprag_study.service.http.web.form.spec import PARTS
 from sprag_study.service.languages import ENGLISH, current, gettext
 from sprag_study.service.reading.numbers import WITHOUT_DOUBT, is_ambiguous, parse_number, question, settled
 from sprag_study.service.reading.texts import did_you_mean
-from sprag_study.service.spec.table_text import (
-    MAX_HEADING,
-    heading_of,
-    settled_table,
-    split,
-    with_units,
-)
+from sprag_study.service.spec.table_text import settled_table, with_units
+from sprag_study.service.table_rows import MAX_HEADING, heading_of, split
 
 #: The field into which columns are pasted.
 COLUMNS: Final = "/columns"

@@ -31,6 +31,9 @@ def test_it_accepts_the_examples(validator: Any, examples: Path) -> None:
     validator.validate(SPEC)
     for name in ("one_pendulum.json", "two_pendulums.toml", "measured_clutch.json"):
         validator.validate(load_spec((examples / name).read_bytes(), format_of(name)))
+    printed = changed({"/run/tolerance": "1·10⁻⁹"})
+    validator.validate(printed)
+    assert parse_spec(printed).study.run["tolerance"] == 1e-9
 
 
 @pytest.mark.parametrize(
@@ -62,6 +65,7 @@ def test_it_accepts_the_examples(validator: Any, examples: Path) -> None:
         {"/base/clutch": {"data": [[0, 1], [1, 2]]}},
         {"/base/clutch": {"data": [[0, 1], [1, 2, 3]], "accuracy": 1}},
         {"/run/tolerance": 1},
+        {"/run/tolerance": "1e-9"},
         {"/run/reset": "never"},
         {"/run/until": "settled"},
         {"/run": {"until": "steady"}},

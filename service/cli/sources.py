@@ -1,0 +1,38 @@
+"""What commands show: the study of a spec, which is run here, or a study of a running service."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from sprag_study.service.cli import completion
+from sprag_study.service.cli.console import wrong_option
+from sprag_study.service.languages import N_
+
+SpecOrStudy = Annotated[
+    str,
+    typer.Argument(
+        metavar="SPEC|ID",
+        help="Study spec, JSON or TOML, which is run here (- reads standard input); or a study of a running service.",
+        autocompletion=completion.studies,
+    ),
+]
+
+
+def is_study(spec: str) -> bool:
+    """Whether an argument names a study of a service: it is no file, and not called like a spec."""
+    path = Path(spec)
+    return spec != "-" and path.suffix.lower() not in (".json", ".toml") and not path.is_file()
+
+
+def refuse_local(**given: Any) -> None:
+    """Refuse what only a spec has; WrongInputError."""
+    options = {"every": "--all", "points_file": "--points", "tables": "--file"}
+    for name, value in given.items():
+        if value is not None and value not in (False, [], ()):
+            reason = N_("belongs to a spec that is run here, not to a study of a service")
+            raise wrong_option(
+                options.get(name, f"--{name}"), "not-used", reason, value if isinstance(value, str) else None
+            )
