@@ -54,12 +54,16 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Image:
-    """A picture as SVG with a caption and a description; ``wide`` takes the width of the page."""
+    """A picture as SVG with a caption and a description; ``wide`` takes the width of the page.
+
+    ``narrow`` is the same picture drawn for a phone, empty where one picture is for both.
+    """
 
     svg: bytes
     caption: str
     alt: str
     wide: bool = True
+    narrow: bytes = b""
     look: Look = ""
     kind: str = "picture"
 
@@ -113,5 +117,7 @@ def _said(part: Any, reading: Reading) -> Any:
         return tuple(_said(item, reading) for item in part)
     if is_dataclass(part) and not isinstance(part, type):
         known = {field.name: getattr(part, field.name) for field in fields(part)}
-        return replace(part, **{name: _said(value, reading) for name, value in known.items() if name != "svg"})
+        return replace(
+            part, **{name: _said(value, reading) for name, value in known.items() if not isinstance(value, bytes)}
+        )
     return part

@@ -16,15 +16,16 @@ from sprag_study.service.exports.inputs import Input
 from sprag_study.service.figures.answers import answers_figure
 from sprag_study.service.figures.curves import curves_figure
 from sprag_study.service.figures.drawings import drawings
-from sprag_study.service.figures.pictures import draw_sensitivity
+from sprag_study.service.figures.svg import WIDE
+from sprag_study.service.figures.svg_bars import sensitivity_svg
 from sprag_study.service.languages import N_, _, gettext
 from sprag_study.service.reading.catalogue import axes_json
 from sprag_study.service.reading.directions import ends_in_words
 from sprag_study.service.reading.part_names import lower_first, upper_first
 from sprag_study.service.reading.reader import CODES, model_title, shown, term, titled
 from sprag_study.service.reading.wording import number, unit_text, words
-from sprag_study.service.report.blocks import Block, Image, Section, Table, Text
-from sprag_study.service.report.drawn import chosen_image, drawing_images, image, map_images
+from sprag_study.service.report.blocks import Block, Section, Table, Text
+from sprag_study.service.report.drawn import chosen_image, drawing_images, image, image_of, map_images
 from sprag_study.service.results.defaults import caption, varying_axes
 from sprag_study.service.results.fronts import goal_units
 from sprag_study.service.results.key_answer_words import answer_facts, curve_name, note_of, said_title
@@ -166,8 +167,8 @@ def _clutch(report: Report) -> Iterator[Block]:
 def _sensitivity(report: Report) -> Iterator[Block]:
     for item in report.effects:
         text = _("What {result} depends on", result=report.reading.within(item.info.name))
-        svg = draw_sensitivity([item], "", report.reading, "svg", noted=False)
-        yield Image(svg, ". ".join((text, *(upper_first(report.reading.say(note)) for note in item.notes))), text)
+        notes = (upper_first(report.reading.say(note)) for note in item.notes)
+        yield image_of(partial(sensitivity_svg, [item], report.reading), WIDE, ". ".join((text, *notes)), text)
 
 
 def _part(report: Report, *, name: str) -> Iterator[Block]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from sprag_study.service.figures.drawing import svg as drawing_svg
 from sprag_study.service.figures.drawings import drawings
 from sprag_study.service.figures.read import read_figure, read_map
-from sprag_study.service.figures.svg import DOUBLE, WIDE, as_file, svg
+from sprag_study.service.figures.svg import DOUBLE, NARROW, WIDE, as_file, svg
 from sprag_study.service.figures.svg_map import map_svg
 from sprag_study.service.languages import _
 from sprag_study.service.reading.part_names import lower_first
@@ -16,7 +18,7 @@ from sprag_study.service.report.conditions import values_of
 from sprag_study.service.results.curves import Map
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from sprag_study.service.figures.figure import Figure
     from sprag_study.service.report.chosen_figures import ChosenFigure
@@ -29,8 +31,24 @@ def image(report: Report, figure: Figure, caption: str) -> Image:
     if read.held and read.studies == 1:  # in the text, which has room for it on a phone too
         caption = f"{caption}. {'; '.join(read.held)}"
     chosen = "" if report.curve is None else str(report.curve)
-    drawn = svg(read, width=WIDE if read.columns == 1 else DOUBLE, label=caption, chosen=chosen, below=True)
-    return Image(as_file(drawn).encode(), caption, caption)
+    return image_of(
+        partial(_figure, read, label=caption, chosen=chosen), WIDE if read.columns == 1 else DOUBLE, caption
+    )
+
+
+def image_of(draw: Callable[[int], str], width: int, caption: str, alt: str = "") -> Image:
+    """What ``draw`` draws in a width (px), across a sheet and for a phone."""
+    whole, narrow = (as_file(draw(each)).encode() for each in (width, NARROW))
+    return Image(whole, caption, alt or caption, narrow=narrow)
+
+
+def _figure(figure: Figure, width: int, *, label: str, chosen: str = "", head: Sequence[str] = ()) -> str:
+    shown = replace(figure, columns=1) if width == NARROW else figure
+    return svg(shown, width=width, label=label, chosen=chosen, head=head, below=True)
+
+
+def _map(drawn: Map, width: int, *, label: str, contours: bool = False) -> str:
+    return map_svg(drawn, contours=contours, width=width, label=label, head=drawn.held, below=True)
 
 
 def drawing_images(report: Report) -> Iterator[Image]:
@@ -47,7 +65,7 @@ def map_images(report: Report, maps: Iterable[Map]) -> Iterator[Image]:
     for drawn in maps:
         read = read_map(drawn, report.reading)
         text = _("{z} over {x} and {y}", z=read.title, x=lower_first(read.names[0]), y=lower_first(read.names[1]))
-        yield Image(as_file(map_svg(read, label=text, head=read.held, below=True)).encode(), text, text)
+        yield image_of(partial(_map, read, label=text), WIDE, text)
 
 
 def chosen_image(chosen: ChosenFigure) -> Block:
@@ -56,8 +74,7 @@ def chosen_image(chosen: ChosenFigure) -> Block:
         return Text(chosen.caption, warning=True)
     text = f"{chosen.name}. {chosen.caption}"
     if isinstance(chosen.shown, Map):
-        drawn = map_svg(chosen.shown, contours=chosen.contours, label=text, head=chosen.shown.held, below=True)
-        return Image(as_file(drawn).encode(), text, text)
+        return image_of(partial(_map, chosen.shown, label=text, contours=chosen.contours), WIDE, text)
     # It is read in units of its own already.
-    drawn = svg(chosen.shown, width=DOUBLE, label=text, head=["; ".join(chosen.shown.held)], below=True)
-    return Image(as_file(drawn).encode(), text, text)
+    head = ["; ".join(chosen.shown.held)]
+    return image_of(partial(_figure, chosen.shown, label=text, head=head), DOUBLE, text)

@@ -107,5 +107,5 @@ def _sections(sections: tuple[Section, ...], place: Path) -> Iterator[dict[str, 
 
 
 def _plain(block: Block, file: str) -> dict[str, Any]:
-    fields = {name: value for name, value in asdict(block).items() if name != "svg"}
+    fields = {name: value for name, value in asdict(block).items() if not isinstance(value, bytes)}
     return {**fields, "file": file} if isinstance(block, Image) else fields

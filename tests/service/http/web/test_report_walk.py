@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from sprag_study.service.settings import Settings
     from tests.service.conftest import Service
+    from tests.service.http.web.conftest import Visitor
 
 LOGO = '<svg xmlns="http://www.w3.org/2000/svg" width="120" height="40"><rect width="120" height="40"/></svg>'
 
@@ -29,6 +30,24 @@ def settings(settings: Settings, tmp_path: Path) -> Settings:
     """Settings of an office that has a logo."""
     (tmp_path / "logo.svg").write_text(LOGO, encoding="utf-8")
     return settings.model_copy(update={"report_folder": str(tmp_path), "report_office": "Бюро приводів"})
+
+
+@pytest.mark.parametrize("visitor", [{"viewport": {"width": 390, "height": 844}}], indirect=True)
+def test_a_phone_has_charts_of_its_own_width_in_a_report(visitor: Visitor, example: str) -> None:
+    page = visitor.page
+    page.goto(f"/studies/{example}/document")
+    page.locator("article.sheet").last.wait_for()
+    assert page.evaluate("() => document.documentElement.scrollWidth") == 390
+    figures = page.locator("article.sheet figure")
+    wide = "each => [...each.querySelectorAll('*')].some((part) => part.scrollWidth > part.clientWidth + 1)"
+    assert not any(figures.nth(place).evaluate(wide) for place in range(figures.count()))
+    # A drawing for a phone is shown in about the size in which it was drawn, so that its texts can be read.
+    chart = page.locator("article.sheet figure:not(.small) img").first
+    assert chart.evaluate("image => image.naturalWidth") == 350
+    assert chart.evaluate("image => image.clientWidth") > 300
+    drawing = page.locator("article.sheet figure.small img").first.bounding_box()
+    assert drawing is not None
+    assert drawing["y"] < 800
 
 
 def test_a_report_with_a_logo_in_ukrainian(browser: Browser, service: Service) -> None:
