@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 #: Every revision that a database can have, oldest first. The last one is that of this program.
-REVISIONS: Final = ("0001", *(f"{number:04}" for number in range(3, 41)))
+REVISIONS: Final = ("0001", *(f"{number:04}" for number in range(3, 42)))
 
 
 def bring_up(connection: sa.Connection, described: sa.MetaData, before: str) -> None:
@@ -148,6 +148,33 @@ def _drop_index_of_kin(connection: sa.Connection) -> None:
     connection.execute(sa.text("DROP INDEX IF EXISTS ix_studies_kin_hash"))
 
 
+def _let_reports_be_of_no_schedule(connection: sa.Connection) -> None:
+    """0041: alerts are reports without a schedule."""
+    there = {column["name"]: column for column in sa.inspect(connection).get_columns("reports")}
+    if there["schedule"]["nullable"]:
+        return
+    if connection.dialect.name == "postgresql":
+        connection.exec_driver_sql("ALTER TABLE reports ALTER COLUMN schedule DROP NOT NULL")
+        return
+    # SQLite changes no column: the table is made anew by its own statement.
+    made = "SELECT sql FROM sqlite_master WHERE name = 'reports'"
+    indexes = "SELECT sql FROM sqlite_master WHERE type = 'index' AND tbl_name = 'reports' AND sql IS NOT NULL"
+    statement: str = connection.exec_driver_sql(made).scalar_one()
+    again = connection.exec_driver_sql(indexes).scalars().all()
+    last = connection.exec_driver_sql("SELECT seq FROM sqlite_sequence WHERE name = 'reports'").scalar()
+    other = statement.replace("TABLE reports", "TABLE reports_now", 1)
+    connection.exec_driver_sql(other.replace("schedule INTEGER NOT NULL", "schedule INTEGER", 1))
+    names = ", ".join(there)
+    connection.exec_driver_sql(f"INSERT INTO reports_now ({names}) SELECT {names} FROM reports")  # noqa: S608
+    connection.exec_driver_sql("DROP TABLE reports")
+    connection.exec_driver_sql("ALTER TABLE reports_now RENAME TO reports")
+    for text in again:
+        connection.exec_driver_sql(text)
+    if last is not None:  # numbers are never given twice
+        connection.execute(sa.text("DELETE FROM sqlite_sequence WHERE name = 'reports'"))
+        connection.execute(sa.text("INSERT INTO sqlite_sequence (name, seq) VALUES ('reports', :last)"), {"last": last})
+
+
 def _text(connection: sa.Connection, table: str, name: str, number: int) -> str:
     """A text of a row. One at a time: that of a study can have megabytes."""
     rows = sa.table(table, sa.column("number"), sa.column(name))
@@ -172,4 +199,5 @@ _STEPS: Final[dict[str, Callable[[sa.Connection], None]]] = {
     "0033": _give_keys_to_senders,
     "0034": _keep_ranks,
     "0035": _drop_index_of_kin,
+    "0041": _let_reports_be_of_no_schedule,
 }

@@ -25,6 +25,7 @@ from pydantic_settings import (
 )
 
 from sprag_study.service.delivery import Delivery, DeliverySettings
+from sprag_study.service.oidc import OidcSettings
 from sprag_study.service.zones import zones
 
 ENV_PREFIX = "SPRAG_"
@@ -44,7 +45,7 @@ class SettingsFileError(Exception):
     """The file of settings cannot be read; the message is one sentence."""
 
 
-class Settings(DeliverySettings):
+class Settings(DeliverySettings, OidcSettings):
     """Every setting with its default and its help; see `table`."""
 
     model_config = SettingsConfigDict(
@@ -310,12 +311,12 @@ class Settings(DeliverySettings):
         return replace(self.delivery(self.address(self.port), self.url_prefix), units=self.units)
 
     def require_safe(self, *, stored: bool = False) -> None:
-        """Raise `UnsafeSettingsError` when another machine could reach the service and there is no token
-        and no proxy logs users in (SPRAG_USER_HEADER).
+        """Raise `UnsafeSettingsError` when another machine could reach the service and there is no token, no proxy
+        logs users in (SPRAG_USER_HEADER), and no OpenID provider does (SPRAG_OIDC_ISSUER).
 
         ``stored`` states whether the database has one.
         """
-        if not self.loopback and self.token is None and not self.user_header and not stored:
+        if not (self.loopback or self.token is not None or self.user_header or self.oidc_issuer or stored):
             raise UnsafeSettingsError(
                 f"The host {self.host} can be reached from other machines, so the service needs a token: "
                 f"`sprag admin token create` makes one, or set {ENV_PREFIX}TOKEN."

@@ -1,8 +1,9 @@
 """Authentication: tokens in headers, browser sessions in cookies, users named by a trusted proxy; and the role of each.
 
-A request carries its token as ``Authorization: Bearer``. A browser logs in once with a token and gets a cookie that
-contains the token's id and the expiry, signed with a key of the database. The cookie is valid on all hosts of that
-database and across restarts, until the token is revoked, the browser logs out, or `SESSION_SECONDS` have passed.
+A request carries its token as ``Authorization: Bearer``. A browser logs in once with a token, or at an OpenID provider
+(`sprag_study.service.http.oidc`), and gets a cookie that contains the token's id or the user, and the expiry, signed
+with a key of the database. The cookie is valid on all hosts of that database and across restarts, until the token is
+revoked or the user removed, the browser logs out, or `SESSION_SECONDS` have passed.
 """
 
 from __future__ import annotations
@@ -12,9 +13,11 @@ import hashlib
 import hmac
 import secrets
 import time
+from base64 import urlsafe_b64decode, urlsafe_b64encode
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Final
+from urllib.parse import urlsplit
 
 from sprag_study.sentences import Sentence
 from sprag_study.service.actor import Actor, Door, Role
@@ -42,6 +45,8 @@ SESSION_SECONDS: Final = 12 * 3600
 BELIEVED_SECONDS: Final = 2.0
 #: Id of the token from the settings.
 _SETTING: Final = "setting"
+#: Beginning of the identity of a session of a user who logged in at the OpenID provider.
+_USER: Final = "user-"
 
 
 class Access:
@@ -57,7 +62,11 @@ class Access:
 
     def __init__(self, settings: Settings, people: People | None = None) -> None:
         self._setting = None if settings.token is None else settings.token.get_secret_value().encode("ascii")
-        self._always = settings.token is not None or not settings.loopback or bool(settings.user_header)
+        self._oidc = f"{settings.oidc_issuer} {settings.oidc_client_id}" if settings.oidc_issuer else None
+        #: Host of the OpenID provider; "" where there is none.
+        self.provider = urlsplit(settings.oidc_issuer).hostname or ""
+        named = bool(settings.user_header or settings.oidc_issuer)
+        self._always = settings.token is not None or not settings.loopback or named
         self._user_header = settings.user_header
         self._user_role = Role(settings.user_role) if settings.user_role else None
         self.attempts = Attempts(settings.trusted_proxies)
@@ -124,10 +133,17 @@ class Access:
         token_id = self._session_of(cookies)
         if token_id == _SETTING and self._setting is not None:
             return Grant(_SETTING, "SPRAG_TOKEN", Role.ADMINISTRATOR, TokenScope.WRITE)
+        if token_id is not None and token_id.startswith(_USER):
+            return self.of_user(_decoded(token_id.removeprefix(_USER)))
         return None if token_id is None else self._used(self._by_id.get(token_id))
 
+    def of_user(self, name: str) -> Grant | None:
+        """The grant of a user who logged in elsewhere; None where there is none, or the user is removed."""
+        record = self._users.get(name)
+        return None if record is None or record.removed_at is not None else _of_user(name, record.role, record)
+
     def _session_of(self, cookies: Mapping[str, str]) -> str | None:
-        """The id of the token of the session in the cookies; None when there is none or it has ended."""
+        """The id of the token, or the user, of the session in the cookies; None when there is none or it has ended."""
         identity, dot, seal = cookies.get(COOKIE, "").rpartition(".")
         token_id, _, end = identity.partition(".")
         if not dot or not hmac.compare_digest(seal.encode("utf-8", "replace"), self._sealed(identity).encode()):
@@ -173,7 +189,7 @@ class Access:
         if role is None or (record is not None and record.removed_at is not None):
             detail = f"{shown(name)} is not a user of this service; `sprag admin user add` adds one."
             raise ApiError("not-allowed", detail)
-        return Grant(f"user {name}", name, role, None, name, None if record is None else record.quota.checks)
+        return _of_user(name, role, record)
 
     def actor(self, grant: Grant, scope: Scope) -> Actor:
         """Who acts in a request, for the log and the ownership of what is new."""
@@ -214,10 +230,20 @@ class Access:
 
     async def log_in(self, grant: Grant) -> str:
         """The value of the session cookie for ``grant``; raises StoreError."""
+        await self.require_key()
+        who = f"{_USER}{_encoded(grant.user)}" if grant.user is not None and grant.token is None else grant.id
+        identity = f"{who}.{int(time.time()) + SESSION_SECONDS}"
+        return f"{identity}.{self._sealed(identity)}"
+
+    async def require_key(self) -> None:
+        """Have a key that signs; raises StoreError."""
         if self._key is None and self._people is not None:
             self._key = await in_thread(self._people.create_session_key)
-        identity = f"{grant.id}.{int(time.time()) + SESSION_SECONDS}"
-        return f"{identity}.{self._sealed(identity)}"
+
+    def sealed(self, text: str) -> str:
+        """The signature of a text that is no session: it has a blank."""
+        assert " " in text, "a text without a blank could be a session"
+        return hmac.new(self._key or secrets.token_bytes(32), text.encode(), hashlib.sha256).hexdigest()
 
     async def log_out(self, cookies: Mapping[str, str]) -> None:
         """End the session in the cookies, including all copies of the cookie; raises StoreError."""
@@ -234,7 +260,21 @@ class Access:
         if identity.startswith(f"{_SETTING}.") and self._setting is not None:
             # A session does not outlive its token: another value of the setting gives another signature.
             message += digest_of(self._setting).encode("ascii")
+        if identity.startswith(_USER):  # nor its provider
+            message += digest_of((self._oidc or secrets.token_hex()).encode()).encode("ascii")
         return hmac.new(self._key or secrets.token_bytes(32), message, hashlib.sha256).hexdigest()
+
+
+def _of_user(name: str, role: Role, record: UserRecord | None) -> Grant:
+    return Grant(f"user {name}", name, role, None, name, None if record is None else record.quota.checks)
+
+
+def _encoded(name: str) -> str:
+    return urlsafe_b64encode(name.encode()).decode("ascii").rstrip("=")
+
+
+def _decoded(text: str) -> str:
+    return urlsafe_b64decode(text + "=" * (-len(text) % 4)).decode()
 
 
 def token_in(header: str) -> bytes | None:

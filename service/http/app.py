@@ -47,6 +47,7 @@ from sprag_study.service.http.drain import Drain
 from sprag_study.service.http.guard import Guard
 from sprag_study.service.http.language import InLanguage
 from sprag_study.service.http.metrics import Metrics
+from sprag_study.service.http.oidc import Provider
 from sprag_study.service.http.operation_metrics import OperationCollector, Queue
 from sprag_study.service.http.prefix import Prefixed
 from sprag_study.service.http.read_ahead import keep_reading_ahead
@@ -64,6 +65,7 @@ from sprag_study.service.http.web import (
     motion,
     moved,
     pages,
+    sign_in,
     study,
 )
 from sprag_study.service.http.web import components as component_pages
@@ -172,6 +174,7 @@ ROUTED = (
     document_pages,
     schedule_pages,
     login,
+    sign_in,
     live_pages,
 )
 
@@ -304,6 +307,7 @@ def create_app(
     metrics = Metrics(used_store, OperationCollector(settings, used_store, queues))
     app = Application(settings, access, metrics, **_ABOUT, lifespan=partial(_running, context, access, owned))
     app.state.access = access
+    app.state.provider = Provider(settings, access.sealed) if settings.oidc_issuer else None
     app.state.metrics = metrics
     app.state.readiness = readiness = Readiness(used_store)
     readiness.watch_schedules(lambda: len(late_runs(used_store)))

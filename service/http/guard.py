@@ -22,7 +22,7 @@ from sprag_study.service.http.grants import OPEN, Grant
 from sprag_study.service.http.problems import ApiError, problem_response
 from sprag_study.service.http.roles import LOOKING
 from sprag_study.service.http.web.problem_page import problem_page
-from sprag_study.service.http.web.way_in import LOGIN_PATH, way_in
+from sprag_study.service.http.web.way_in import LOGIN_PATH, OIDC_PATH, RETURN_PATH, way_in
 from sprag_study.service.logs import note_caller
 from sprag_study.service.settings import Settings
 from sprag_study.service.storage.errors import StoreError
@@ -34,7 +34,7 @@ _LOG = logging.getLogger("sprag.service")
 LIVE_PATH: Final = "/livez"
 #: Paths that need no token: health checks, the login, and what its page has on it.
 OPEN_PATHS: Final = frozenset(
-    {LIVE_PATH, "/readyz", LOGIN_PATH, "/me", "/static/sprag.css", "/static/sprag.svg"}
+    {LIVE_PATH, "/readyz", LOGIN_PATH, OIDC_PATH, RETURN_PATH, "/me", "/static/sprag.css", "/static/sprag.svg"}
     | {"/static/link.js", "/static/keys.js", "/static/reader.js"}
 )
 SAFE_METHODS: Final = frozenset({"GET", "HEAD", "OPTIONS"})

@@ -31,6 +31,8 @@ _ANYONE: Final = (
     "GET /login",
     "POST /login",
     "POST /logout",
+    "GET /login/oidc",
+    "GET /login/oidc/return",
     "GET /static/{name}",
     "GET /me",
     "POST /me",

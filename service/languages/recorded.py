@@ -59,3 +59,10 @@ TOKEN_EXPIRED: Final = N_("The token {token} expired at {time}; `sprag admin tok
 NO_LONGER: Final = N_("You may no longer do this: you were removed, your token was revoked, or your role was changed.")
 TOKEN_REVOKED: Final = N_("The token {token} was revoked.")
 TOKEN_OF_REMOVED_USER: Final = N_("The token {token} belongs to the user {user}, who was removed.")
+#: Why the OpenID provider's account lets nobody in.
+NO_USER: Final = N_("{user} is not a user of this service; an administrator can add one of this name.")
+USER_REMOVED: Final = N_("The user {user} was removed.")
+OTHER_ACCOUNT: Final = N_(
+    "Another account of the provider is the user {user} already; an administrator who removes and restores the user "
+    "lets this one in."
+)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Self
 
 from sprag_study.service.storage import maintenance
+from sprag_study.service.storage.alerts import Alerts
 from sprag_study.service.storage.components import Components
 from sprag_study.service.storage.database.session import Session
 from sprag_study.service.storage.deployment import Deployment
@@ -52,7 +53,7 @@ class Store:
             Totals(session, clock),
             Room(session, clock),
         )
-        self.dispatchers = Dispatchers(session, clock, chunking)
+        self.alerts, self.dispatchers = Alerts(session, clock), Dispatchers(session, clock, chunking)
         orders = Orders(session, clock)
         self.digests = Digests(session, clock, orders)
         self.rows = Rows(session, clock, orders, self.digests)

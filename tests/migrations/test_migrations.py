@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from sprag_study import migrations
 from sprag_study.migrations import REVISIONS
+from sprag_study.sentences import Sentence
 from sprag_study.service.actor import Actor, Door, act_as
 from sprag_study.service.spec.document import parse_spec
 from sprag_study.service.storage import maintenance
@@ -274,6 +275,32 @@ def test_a_key_goes_to_the_owner_of_its_study_or_schedule(file: Path, url: str) 
             hers, nights = store.studies.of_key("hers", "hash"), store.schedules.of_key("nights", "hash")
             assert (hers and hers.name, nights and nights.id) == ("running", "sc_1")
             assert store.studies.of_key("key", "hash") is None
+
+
+def test_reports_keep_their_rows_and_numbers_when_they_need_no_schedule(file: Path, url: str) -> None:
+    thaw("0040", file)
+    connection = sqlite_driver().connect(file)
+    connection.execute(
+        "INSERT INTO schedules (number, id, name, spec, cron, zone, priority, fresh, enabled, created_at) "
+        "VALUES (4, 'sc_1', 'nightly', '{}', '@daily', 'UTC', 0, 0, 0, 0)"
+    )
+    for number in (7, 9):
+        connection.execute(
+            "INSERT INTO reports (number, id, schedule, due, kind, channel, target, content, state, attempts, "
+            "next_try, created_at) VALUES (?, ?, 4, 1, 'run', 'email', ?, '{}', 'waiting', 0, 1, 1)",
+            (number, f"rp_{number}", f"{number}@example.com"),
+        )
+    connection.execute("DELETE FROM reports WHERE number = 9")
+    connection.commit()
+    connection.close()
+    upgrade(url)
+    query = "SELECT number, id, schedule, target FROM reports"
+    assert rows_of(file, query) == [(7, "rp_7", 4, "7@example.com")]
+    assert rows_of(file, "SELECT seq FROM sqlite_sequence WHERE name = 'reports'") == [(9,)]
+    with Store.open(url) as store:
+        assert store.alerts.begin("disk", Sentence("it is full"), ["dora@example.com"])
+        claimed = [store.reports.claim(), store.reports.claim()]
+    assert [(report.number, report.schedule) for report in claimed if report] == [(7, "sc_1"), (10, "")]
 
 
 @pytest.mark.parametrize(

@@ -6,11 +6,20 @@ from fastapi import Request
 from starlette.responses import RedirectResponse, Response
 
 from sprag_study.service.actor import Role
-from sprag_study.service.http.access import COOKIE, SESSION_SECONDS
+from sprag_study.service.http.access import COOKIE
 from sprag_study.service.http.problems import ApiError
 from sprag_study.service.http.routers import page_router
 from sprag_study.service.http.web.form.values import Form
-from sprag_study.service.http.web.way_in import LOGIN_PATH, access_of, kept_form, kept_page, login_page, within
+from sprag_study.service.http.web.way_in import (
+    LOGIN_PATH,
+    access_of,
+    is_secure,
+    kept_form,
+    kept_page,
+    login_page,
+    with_session,
+    within,
+)
 from sprag_study.service.languages import _
 from sprag_study.service.reading.reader import shown_stored
 
@@ -37,7 +46,9 @@ async def log_in(request: Request, values: Form) -> Response:
             fault = shown_stored(access.why_not(token) or "") or _("This token is not valid.")
             return login_page(request, access, wanted, fault=fault, status=401, kept=kept)
     except ApiError as error:
-        response = login_page(request, access, wanted, fault=error.detail, status=error.type.status, kept=kept)
+        response = login_page(
+            request, access, wanted, fault=shown_stored(error.detail), status=error.type.status, kept=kept
+        )
         response.headers.update(error.headers)
         return response
     if kept is not None and grant.role is Role.VIEWER:
@@ -45,15 +56,7 @@ async def log_in(request: Request, values: Form) -> Response:
         fault = _("{who} {reason}, so the form cannot be sent. Use another token.", who=grant.label, reason=reason)
         return login_page(request, access, wanted, fault=fault, status=403, kept=kept)
     answer = RedirectResponse(within(wanted), 303) if kept is None else kept_page(grant, wanted, kept)
-    answer.set_cookie(
-        COOKIE,
-        await access.log_in(grant),
-        max_age=SESSION_SECONDS,
-        httponly=True,
-        samesite="lax",
-        secure=_is_secure(request),
-    )
-    return answer
+    return await with_session(answer, request, grant)
 
 
 @router.post("/logout")
@@ -61,12 +64,5 @@ async def log_out(request: Request) -> Response:
     """End the session, including all copies of its cookie."""
     await access_of(request).log_out(request.cookies)
     response = RedirectResponse(LOGIN_PATH, status_code=303)
-    response.delete_cookie(COOKIE, httponly=True, samesite="lax", secure=_is_secure(request))
+    response.delete_cookie(COOKIE, httponly=True, samesite="lax", secure=is_secure(request))
     return response
-
-
-def _is_secure(request: Request) -> bool:
-    """Whether the browser uses TLS, with this service or with a trusted proxy before it."""
-    forwarded = request.headers.get("x-forwarded-proto", "")
-    trusted = access_of(request).attempts.from_proxy(request.scope)
-    return request.url.scheme == "https" or (trusted and forwarded == "https")

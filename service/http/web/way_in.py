@@ -12,7 +12,7 @@ from urllib.parse import quote, urlsplit
 
 from starlette.responses import RedirectResponse
 
-from sprag_study.service.http.access import COOKIE, Access
+from sprag_study.service.http.access import COOKIE, SESSION_SECONDS, Access
 from sprag_study.service.http.grants import Grant
 from sprag_study.service.http.web.form.values import read_form
 from sprag_study.service.http.web.problem_page import wants_page
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from sprag_study.service.http.web.form.entries import Values
 
 LOGIN_PATH: Final = "/login"
+#: Where the login at the OpenID provider begins, and where it comes back.
+OIDC_PATH: Final = "/login/oidc"
+RETURN_PATH: Final = "/login/oidc/return"
 #: Field of the login that states that a form is sent afterwards, and the prefix of the names of its fields.
 KEPT: Final = "kept"
 KEPT_PREFIX: Final = "kept "
@@ -39,6 +42,22 @@ _MENDED: Final = frozenset({"unauthorized", "read-only"})
 def access_of(request: Request) -> Access:
     """The service's `Access`."""
     return cast("Access", request.app.state.access)
+
+
+def is_secure(request: Request) -> bool:
+    """Whether the browser uses TLS, with this service or with a trusted proxy before it."""
+    forwarded = request.headers.get("x-forwarded-proto", "")
+    trusted = access_of(request).attempts.from_proxy(request.scope)
+    return request.url.scheme == "https" or (trusted and forwarded == "https")
+
+
+async def with_session(answer: Response, request: Request, grant: Grant) -> Response:
+    """An answer that begins a session of ``grant`` in the browser; raises StoreError."""
+    session = await access_of(request).log_in(grant)
+    answer.set_cookie(
+        COOKIE, session, max_age=SESSION_SECONDS, httponly=True, samesite="lax", secure=is_secure(request)
+    )
+    return answer
 
 
 async def way_in(request: Request, error: ApiError, access: Access) -> Response | None:
@@ -69,8 +88,12 @@ def login_page(
     fault: str = "",
     status: int = 200,
     kept: Mapping[str, str] | None = None,
+    refused: str = "",
 ) -> Response:
-    """The form for the token, with the destination ``wanted`` and the form ``kept`` for it, if any."""
+    """The form for the token, with the destination ``wanted`` and the form ``kept`` for it, if any.
+
+    ``fault`` is what is wrong with the token, and ``refused`` why the login at the OpenID provider lets nobody in.
+    """
     grant = cast("Grant | None", request.scope.get("sprag.grant"))
     if grant is None:
         fault = fault or shown_stored(access.why_ended(request.cookies) or "")
@@ -84,6 +107,8 @@ def login_page(
         fault=fault,
         kept=kept,
         prefix=KEPT_PREFIX,
+        provider=access.provider,
+        refused=refused,
     )
 
 

@@ -1,9 +1,10 @@
 """People: users with the quotas of what belongs to them, tokens, and the sessions of browsers.
 
-A user has no password: users log in with a token of theirs, or a trusted proxy names them. A token is shown once and
-never stored; only its SHA-256 digest is. A digest without salt or key stretching is enough: a token consists of 256
-random bits, which nobody can guess. The cookie of a session contains its expiry and a signature, so a session needs no
-row of its own and a login no write: the database has the key that signs, and the sessions that were ended early.
+A user has no password: users log in with a token of theirs or at an OpenID provider, or a trusted proxy names them. A
+token is shown once and never stored; only its SHA-256 digest is. A digest without salt or key stretching is enough: a
+token consists of 256 random bits, which nobody can guess. The cookie of a session contains its expiry and a signature,
+so a session needs no row of its own and a login with a token no write: the database has the key that signs, and the
+sessions that were ended early.
 """
 
 from __future__ import annotations
@@ -172,6 +173,8 @@ class People(Part):
         values: dict[str, Any] = {**given, **({} if role is None else {"role": role.value})}
         if removed is not None:
             values["removed_at"] = sa.func.coalesce(_U.removed_at, self._now()) if removed else None
+            if not removed:  # the account at the OpenID provider may be another one by now
+                values["subject"] = None
         with self.session.write() as connection:
             _require_standing(connection, self._now())
             row, before = None, acting().door is Door.PAGE and _is_administered(connection)
@@ -185,6 +188,36 @@ class People(Part):
             action = "user.change" if removed is None else "user.remove" if removed else "user.restore"
             said = {} if role is None else {"role": role.value}
             note(connection, self._now(), action, name, **said, **_set(quota))
+            return _user_record(row)
+
+    def sign_in(self, subject: str, name: str, role: Role | None, *, create: bool) -> UserRecord:
+        """The user of the account ``subject`` at the OpenID provider, with the ``role`` that its groups give.
+
+        The first login of an account takes the user of that ``name``; with ``create`` it adds one who is not there.
+        From then on the account is that user, whatever its name. Raises FaultError where nobody may come in by it.
+        """
+        with self.session.write() as connection:
+            row = connection.execute(sa.select(USERS).where(_U.subject == subject)).one_or_none()
+            row = row or connection.execute(sa.select(USERS).where(_U.name == name)).one_or_none()
+            now, values = self._now(), {"subject": subject, **({} if role is None else {"role": role.value})}
+            if row is None:
+                if not create or role is None:
+                    raise FaultError("not-allowed", Sentence(recorded.NO_USER, user=name))
+                row = connection.execute(
+                    sa.insert(USERS).values(name=name, created_at=now, **values).returning(USERS)
+                ).one()
+                note(connection, now, "user.add", name, role=row.role, login=True)
+                return _user_record(row)
+            if row.removed_at is not None:
+                raise FaultError("not-allowed", Sentence(recorded.USER_REMOVED, user=row.name))
+            if row.subject not in (None, subject):
+                raise FaultError("not-allowed", Sentence(recorded.OTHER_ACCOUNT, user=row.name))
+            changes = {} if role in (None, Role(row.role)) else {"role": [row.role, values["role"]]}
+            if row.subject is None or changes:
+                change = sa.update(USERS).where(_U.name == row.name).values(values).returning(USERS)
+                after = connection.execute(change).one()
+                note(connection, now, "user.change", row.name, login=row.subject is None or None, changes=changes)
+                row = after
             return _user_record(row)
 
     def hand_over(self, name: str, heir: str) -> tuple[int, int]:

@@ -18,6 +18,9 @@ USERS = sa.Table(
     sa.Column("most_cases", sa.BigInteger),
     sa.Column("most_bytes", sa.BigInteger),
     sa.Column("most_checks", sa.Integer),
+    # SHA-256 of issuer and subject of the account at the OpenID provider; NULL for who never logged in there.
+    sa.Column("subject", sa.String(64)),
+    sa.Index("ix_users_subject", "subject", unique=True),
     sqlite_autoincrement=True,
 )
 

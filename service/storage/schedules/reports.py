@@ -1,4 +1,4 @@
-"""Reports of schedules that are to be sent: an outbox.
+"""Reports of schedules, and alerts, that are to be sent: an outbox.
 
 A report is written in the transaction that finds its run over, so that none is lost; it is claimed for a time before it
 is sent, so that no two processes send it at once, and marked as sent afterwards. A process that is killed between
@@ -22,10 +22,8 @@ from sprag_study.service.storage.people.audit import note
 from sprag_study.service.storage.schedules.tables import REPORTS, SCHEDULES
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
     from datetime import datetime
-
-    from sprag_study.service.schedules.report_to import ReportTo
 
 _P, _S = REPORTS.c, SCHEDULES.c
 #: For so long a process may take to send a report before another one tries.
@@ -42,7 +40,10 @@ class ReportState(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Claimed:
-    """A report that this process is to send, for the ``attempts``-th time. ``content`` is what it says."""
+    """A report that this process is to send, for the ``attempts``-th time.
+
+    ``content`` is what it says, and ``schedule`` the id of its schedule; "" for an alert.
+    """
 
     number: int
     id: str
@@ -71,9 +72,15 @@ class ReportRecord:
 
 
 def add_reports(
-    connection: sa.Connection, now: int, schedule: int, due: int, kind: str, to: ReportTo, content: Mapping[str, Any]
+    connection: sa.Connection,
+    now: int,
+    schedule: int | None,
+    due: int,
+    kind: str,
+    targets: Iterable[tuple[str, str]],
+    content: Mapping[str, Any],
 ) -> int:
-    """Add a report for each target of ``to``, unless it is there, at ``now`` (µs since 1970); returns how many."""
+    """Add a report for each channel and target, unless it is there, at ``now`` (µs since 1970); returns how many."""
     this = sa.select(_P.channel, _P.target).where(_P.schedule == schedule, _P.due == due, _P.kind == kind)
     known = {(row.channel, row.target) for row in connection.execute(this)}
     rows = [
@@ -90,7 +97,7 @@ def add_reports(
             "next_try": now,
             "created_at": now,
         }
-        for channel, target in to.targets
+        for channel, target in targets
         if (channel, target) not in known
     ]
     if rows:
@@ -109,7 +116,7 @@ class Reports(Part):
         free = _P.claimed_until.is_(None) | (_P.claimed_until <= now) | (_P.claimed_until > end)
         query = (
             sa.select(REPORTS, _S.id.label("schedule_id"))
-            .join_from(REPORTS, SCHEDULES)
+            .outerjoin_from(REPORTS, SCHEDULES)
             .where(_P.state == ReportState.WAITING.value, _P.next_try <= now, free)
             .order_by(_P.next_try, _P.number)
             .limit(1)
@@ -127,7 +134,7 @@ class Reports(Part):
         return Claimed(
             row.number,
             row.id,
-            row.schedule_id,
+            row.schedule_id or "",
             row.channel,
             row.target,
             json.loads(row.content),

@@ -358,7 +358,7 @@ class Runs(Part):
                 content = {**about(schedule, run.due), "outcome": filled(RunOutcome, outcome), "study": outcome.study}
                 # For mails in other languages than that of the sentence.
                 content["known"] = {"reason": outcome.reason, "missed": outcome.missed, **outcome.sentences}
-                add_reports(connection, now, run.schedule, run.due, "run", to, content)
+                add_reports(connection, now, run.schedule, run.due, "run", to.targets, content)
         return bool(concluded.rowcount)
 
     def between(self, since: datetime, until: datetime, most: int) -> list[NightRun]:
@@ -459,7 +459,7 @@ class Runs(Part):
             content = {**about(row, due), "study": run.study, "sentence": sentence}
             if isinstance(sentence, Sentence):
                 content["known"] = {"sentence_values": sentence.to_json()}
-            return add_reports(connection, self._now(), run.schedule, due, "overdue", to, content)
+            return add_reports(connection, self._now(), run.schedule, due, "overdue", to.targets, content)
 
 
 def runs_of(connection: sa.Connection, number: int, most: int) -> tuple[RunRecord, ...]:

@@ -99,9 +99,11 @@ REPORTS = sa.Table(
     sa.Column("number", sa.Integer, primary_key=True, autoincrement=True),
     # Identifies the report to its recipient, however often it is sent.
     sa.Column("id", sa.String(40), nullable=False, unique=True),
-    sa.Column("schedule", sa.Integer, sa.ForeignKey("schedules.number"), nullable=False),
+    # NULL: about the deployment (`sprag_study.service.storage.alerts`).
+    sa.Column("schedule", sa.Integer, sa.ForeignKey("schedules.number")),
+    # Of an alert: when it began.
     sa.Column("due", sa.BigInteger, nullable=False, index=True),
-    # "run": about a run that is over; "overdue": about a due time that nobody has taken up.
+    # "run": about a run that is over; "overdue": about a due time that nobody has taken up; of an alert its kind.
     sa.Column("kind", sa.String(12), nullable=False),
     # "email" with an address, or "webhook" with a URL.
     sa.Column("channel", sa.String(12), nullable=False),

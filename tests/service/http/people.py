@@ -50,6 +50,6 @@ class Office:
         headers = {} if name is None else {"Authorization": f"Bearer {self.tokens[name]}"}
         return self._connect(self.app, headers=headers)
 
-    def behind_proxy(self, **headers: str) -> httpx.Client:
+    def behind_proxy(self, **headers: str | bytes) -> httpx.Client:
         """A client of the proxy at 127.0.0.1."""
         return self._connect(self.app, headers=headers)

@@ -46,7 +46,7 @@ def test_every_route_declares_its_role_and_none_else_does(service: Service) -> N
     # What is open without a login says nothing of a study.
     assert {route for route, role in ROLES.items() if role is None} == {
         "GET /livez", "GET /readyz", "GET /login", "POST /login", "POST /logout", "GET /static/{name}",
-        "GET /me", "POST /me",
+        "GET /me", "POST /me", "GET /login/oidc", "GET /login/oidc/return",
     }  # fmt: skip
     # Viewers change nothing: five compute an answer.
     changing = {route for route, role in ROLES.items() if role is Role.VIEWER and not route.startswith("GET ")}

@@ -1,0 +1,113 @@
+"""An OpenID provider that says whatever a test wants, with real keys, on a port of this machine."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from base64 import urlsafe_b64encode
+from collections.abc import Iterator
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+from urllib.parse import parse_qs
+
+from joserfc import jwt
+from joserfc.jwk import OctKey, RSAKey
+
+CLIENT = "sprag"
+
+
+class Openid:
+    """What the provider says; a test changes it.
+
+    Attributes
+    ----------
+    about, claims : further metadata, and further claims of the ID token; a claim that is None is left out
+    userinfo : claims of the userinfo
+    header, key : of the signature; without a key there is none
+    status : of the answer of the token endpoint
+    asked : forms that were sent to the token endpoint
+    """
+
+    def __init__(self, port: int) -> None:
+        self.issuer = f"http://127.0.0.1:{port}"
+        self.known = RSAKey.generate_key(2048, {"kid": "k1"})
+        self.key: RSAKey | OctKey | None = self.known
+        self.header: dict[str, str] = {"alg": "RS256", "kid": "k1"}
+        self.about: dict[str, Any] = {}
+        self.claims: dict[str, Any] = {}
+        self.userinfo: dict[str, Any] = {}
+        self.status = 200
+        self.asked: list[dict[str, str]] = []
+
+    def metadata(self) -> dict[str, Any]:
+        """The metadata."""
+        names = {"authorization_endpoint": "authorize", "token_endpoint": "token", "jwks_uri": "keys"}
+        found = {name: f"{self.issuer}/{path}" for name, path in (names | {"userinfo_endpoint": "userinfo"}).items()}
+        return {"issuer": self.issuer, **found, **self.about}
+
+    def tokens(self) -> dict[str, Any]:
+        """The tokens for a code."""
+        now = int(time.time())
+        claims = {"iss": self.issuer, "aud": CLIENT, "sub": "s1", "iat": now, "exp": now + 60, **self.claims}
+        kept = {name: value for name, value in claims.items() if value is not None}
+        given = {"access_token": "a1", "token_type": "Bearer"}
+        if self.key is None:
+            parts = (json.dumps(part).encode() for part in ({"alg": "none"}, kept))
+            return {
+                **given,
+                "id_token": ".".join([*(urlsafe_b64encode(part).decode().rstrip("=") for part in parts), ""]),
+            }
+        return {**given, "id_token": jwt.encode(self.header, kept, self.key, algorithms=["RS256", "HS256"])}
+
+    def answer(self, path: str) -> tuple[int, Any]:
+        """Status and content for a path."""
+        match path.partition("?")[0]:
+            case "/.well-known/openid-configuration":
+                return 200, self.metadata()
+            case "/keys":
+                return 200, {"keys": [self.known.as_dict(private=False)]}
+            case "/token":
+                return self.status, self.tokens() if self.status == 200 else {"error": "invalid_grant"}
+            case "/userinfo":
+                return 200, {"sub": "s1", **self.userinfo}
+        return 404, {}
+
+
+@contextmanager
+def openid() -> Iterator[Openid]:
+    """A provider that answers until the end of the block."""
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            self._say()
+
+        def do_POST(self) -> None:
+            sent = self.rfile.read(int(self.headers["Content-Length"])).decode()
+            form = {name: values[0] for name, values in parse_qs(sent).items()}
+            provider.asked.append({**form, "authorization": self.headers.get("Authorization", "")})
+            self._say()
+
+        def _say(self) -> None:
+            status, content = provider.answer(self.path)
+            body = json.dumps(content).encode()
+            self.send_response(status)
+            self.send_header("Content-Type", "application/json")
+            self.send_header("Content-Length", str(len(body)))
+            self.end_headers()
+            self.wfile.write(body)
+
+        def log_message(self, *_: object) -> None:
+            """Say nothing."""
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    provider = Openid(server.server_port)
+    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.05})
+    thread.start()
+    try:
+        yield provider
+    finally:
+        server.shutdown()
+        server.server_close()
+        thread.join()
