@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import tempfile
 import weakref
 from contextlib import ExitStack
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag_study.here import Here
 from sprag_study.service.client.queries import spec_of
 from sprag_study.service.client.synchronous.study import Study
-from sprag_study.service.jobs.local import opened, pool_size, run_stored
+from sprag_study.service.jobs.local import opened, pool_size, run_folder, run_stored
 from sprag_study.service.plain_data import plain
 from sprag_study.service.settings import Settings
 from sprag_study.service.spec.document import SpecError, parse_spec
@@ -112,12 +110,8 @@ class _Local(Here):
         self._processes, self._kept = processes, database is not None
         stack = ExitStack()
         url = settings.database_url if self._kept else None
-        if content is not None:
-            file = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="sprag-study-"))) / "study.sqlite3"
-            file.write_bytes(content)
-            url = f"sqlite:///{file}"
         chunking = Chunking(settings.chunk_cases, settings.pool_processes, settings.chunk_timeout)
-        super().__init__(stack.enter_context(opened(url, chunking)), settings)
+        super().__init__(stack.enter_context(opened(url, chunking, content)), settings)
         # After those of the folders, so that it comes before them where the program ends.
         self._release = weakref.finalize(self, stack.close)
 
@@ -149,8 +143,8 @@ class _Local(Here):
 
     def content(self) -> bytes:
         """A copy of the database."""
-        with tempfile.TemporaryDirectory() as folder:
-            copy = Path(folder) / "copy.sqlite3"
+        with run_folder() as folder:
+            copy = folder / "copy.sqlite3"
             self.library.store.backup(copy)
             return copy.read_bytes()
 

@@ -9,10 +9,11 @@ from typing import Annotated
 
 import typer
 
-from sprag_study.service.cli.common import CURRENT, profile_file, wants_json
+from sprag_study.service.cli.common import CURRENT, wants_json
 from sprag_study.service.cli.console import say, write_json
 from sprag_study.service.cli.remote import served_by
 from sprag_study.service.languages import _
+from sprag_study.service.login import profile_file
 
 
 def login(

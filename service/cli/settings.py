@@ -7,11 +7,12 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Final
 
-from sprag_study.service.cli.common import DEFAULT_SERVER, profile, profile_file, wants_json
+from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.configured import read_settings
 from sprag_study.service.cli.console import WrongInputError, show_table, write_json
 from sprag_study.service.faults import Fault
 from sprag_study.service.languages import N_, _
+from sprag_study.service.login import DEFAULT_SERVER, profile, profile_file
 
 if TYPE_CHECKING:
     from sprag_study.service.settings import EffectiveSetting

@@ -30,10 +30,10 @@ SILENCE: Final = 30.0
 API: Final = "/api/v1"
 #: Addresses of the service that do not lie under its API.
 _OUTSIDE: Final = frozenset({"/livez", "/readyz", "/metrics"})
-#: Address of a service when none is given.
-DEFAULT_SERVER: Final = "http://127.0.0.1:8000"
-#: Seconds to wait for an answer; curves of a large study are read from disk first.
+#: Seconds to wait for an answer that is only read, and for one that the service computes: by its default settings it
+#: ends a computation within ten minutes and says so.
 TIMEOUT: Final = httpx.Timeout(60.0, connect=10.0)
+COMPUTED: Final = httpx.Timeout(900.0, connect=10.0)
 #: Writing a whole study can take minutes before its first byte arrives.
 FILE_TIMEOUT: Final = httpx.Timeout(None, connect=10.0)
 #: Formats of rows that are text, and how many of their lines are no rows: heads and ends.
@@ -82,10 +82,18 @@ def _trusted() -> ssl.SSLContext:
 
 def within(seconds: float | None) -> httpx.Timeout:
     """`TIMEOUT`, limited to ``seconds`` where given, but at least one second."""
-    if seconds is None:
-        return TIMEOUT
+    return TIMEOUT if seconds is None else limited(min(seconds, TIMEOUT.read or seconds))
+
+
+def limited(seconds: float) -> httpx.Timeout:
+    """A limit for each part of a request, at least one second; for connecting no longer than usual."""
     seconds = max(seconds, 1.0)
-    return httpx.Timeout(min(seconds, TIMEOUT.read or seconds), connect=min(seconds, TIMEOUT.connect or seconds))
+    return httpx.Timeout(seconds, connect=min(seconds, TIMEOUT.connect or seconds))
+
+
+def patience(method: str, path: str) -> httpx.Timeout:
+    """How long to wait for an answer: specs are checked, and views of a study and its cases are computed."""
+    return COMPUTED if method == "POST" or path.count("/") > 2 else TIMEOUT
 
 
 def document(server: str, response: httpx.Response) -> dict[str, Any]:

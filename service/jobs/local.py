@@ -73,12 +73,24 @@ class LocalRun:
 
 
 @contextmanager
-def opened(database_url: str | None, chunking: Chunking) -> Iterator[Store]:
-    """The store of a database, or of a temporary one, which is deleted with the context."""
+def run_folder() -> Iterator[Path]:
+    """A temporary folder, deleted with the context; those that killed processes left behind are deleted before."""
     sweep(Path(tempfile.gettempdir()).glob(f"{_FOLDER_PREFIX}*"))
     with tempfile.TemporaryDirectory(prefix=_FOLDER_PREFIX) as folder, marked(Path(folder)):
-        url = database_url or f"sqlite:///{Path(folder) / 'run.sqlite3'}"
-        with Store.open(url, chunking=chunking) as store:
+        yield Path(folder)
+
+
+@contextmanager
+def opened(database_url: str | None, chunking: Chunking, content: bytes | None = None) -> Iterator[Store]:
+    """The store of a database, or of a temporary one, which is deleted with the context.
+
+    ``content`` is the file of the temporary one, empty by default.
+    """
+    with run_folder() as folder:
+        file = folder / "run.sqlite3"
+        if content is not None:
+            file.write_bytes(content)
+        with Store.open(database_url or f"sqlite:///{file}", chunking=chunking) as store:
             yield store
 
 

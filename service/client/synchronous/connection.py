@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import time
 import uuid
 from collections.abc import Generator, Iterator
 from contextlib import closing, contextmanager
-from typing import Any
+from functools import partial
+from typing import Any, Self
 
 import httpx
 
@@ -15,7 +15,6 @@ from sprag_study.service.client.errors import UnreachableError
 from sprag_study.service.client.events import EventReader, StudyEvent
 from sprag_study.service.client.retries import RETRY_SECONDS, Retries
 from sprag_study.service.client.wire import (
-    DEFAULT_SERVER,
     EVENTS_TIMEOUT,
     FILE_TIMEOUT,
     LINES_WITHOUT_ROWS,
@@ -23,12 +22,14 @@ from sprag_study.service.client.wire import (
     address,
     connection_options,
     document,
+    limited,
+    patience,
     plain_body,
     refusal,
     study_path,
     unanswered,
-    within,
 )
+from sprag_study.service.login import service_of
 
 
 class Connection:
@@ -37,19 +38,23 @@ class Connection:
     Parameters
     ----------
     server : str, optional
-        Its address; by default that in ``SPRAG_SERVER``, else ``http://127.0.0.1:8000``.
+        Its address; by default that in ``SPRAG_SERVER``, else that of ``sprag login``, else ``http://127.0.0.1:8000``.
     token : str, optional
-        Its token; by default that in ``SPRAG_TOKEN``; "" for none.
+        Its token; by default that in ``SPRAG_TOKEN``, of the service of the login that of the login; "" for none.
     retry : float
         Seconds for which requests are repeated, with growing pauses, while a service that has answered before does not
         answer, for instance during a restart. Only requests that may be sent twice are repeated; 0 repeats none.
     timeout : float, optional
-        Longest wait for an answer, s; by default 60, and any for files. At least 1.
+        Longest wait for an answer, s, at least 1; any for files. By default 60, and 900 for what the service computes:
+        checks of specs, views of studies and of cases.
     transport : httpx.BaseTransport, optional
         Replaces the network, for instance in tests.
 
     Every method may raise `UnreachableError` when no service answers, and `RefusedError`, whose ``errors`` list each
     fault with its field, value and allowed range. ValueError for a server that is not an HTTP address.
+
+    A pickle has the address, but no token: whoever opens it has the token of ``SPRAG_TOKEN`` or of the login there. A
+    client with a ``transport`` cannot be pickled. A copy is the client itself.
     """
 
     def __init__(
@@ -61,12 +66,24 @@ class Connection:
         timeout: float | None = None,
         transport: httpx.BaseTransport | None = None,
     ) -> None:
-        chosen = os.environ.get("SPRAG_SERVER") or DEFAULT_SERVER if server is None else server
+        chosen, secret = service_of(server, token)
         self.server = chosen.rstrip("/")
-        options = connection_options(self.server, os.environ.get("SPRAG_TOKEN") if token is None else token)
-        self._http = httpx.Client(transport=transport, **options | {"timeout": within(timeout)})
-        self.retry = retry
+        self._http = httpx.Client(transport=transport, **connection_options(self.server, secret))
+        self.retry, self._timeout, self._open_to_all = retry, timeout, token == ""
+        self._replaced = transport is not None
         self._answered = False
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self._replaced:
+            raise TypeError("a client with a transport of its own cannot be pickled: open one where it is needed")
+        token = "" if self._open_to_all else None
+        return partial(type(self), self.server, token, retry=self.retry, timeout=self._timeout), ()
+
+    def __copy__(self) -> Self:
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        return self
 
     def __enter__(self) -> Connection:
         return self
@@ -117,6 +134,7 @@ class Connection:
             arguments["headers"] = {"Idempotency-Key": key or uuid.uuid4().hex}
         if etag is not None:
             arguments["headers"] = {"If-Match": f'"{etag}"'}
+        arguments.setdefault("timeout", patience(method, path) if self._timeout is None else limited(self._timeout))
         retries = Retries(method, path, key is not None, self._seconds(once))
         while True:
             try:

@@ -19,6 +19,8 @@ from sprag_study.service.cli.app import command_line
 from sprag_study.service.cli.groups import common_first
 from sprag_study.service.cli.old_words import OLD, forwarded
 from sprag_study.service.client import Client
+from sprag_study.service.login import DEFAULT_SERVER
+from sprag_study.service.login import profile_file as login_file
 from sprag_study.service.storage.people.scopes import TokenScope
 from tests.conftest import Finished
 from tests.service.conftest import Service
@@ -131,7 +133,7 @@ def login(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name in ("SPRAG_SERVER", "SPRAG_TOKEN"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(typer, "get_app_dir", lambda name: str(tmp_path / "settings" / name))
-    return common.profile_file()
+    return login_file()
 
 
 def test_a_login_keeps_address_and_token_for_its_service_only(
@@ -213,4 +215,4 @@ def test_the_secret_of_this_machine_is_not_sent_to_the_service_of_a_login(
 def test_a_damaged_login_is_none(login: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     login.parent.mkdir(parents=True)
     login.write_text("not JSON")
-    assert common.address() == (common.DEFAULT_SERVER, None)
+    assert common.address() == (DEFAULT_SERVER, None)
