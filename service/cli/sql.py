@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from sprag_study.service.cli.case_views import SpecOrStudy, is_study, refuse_local, say_file
+from sprag_study.service.cli.case_views import say_file
 from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.configured import read_settings
 from sprag_study.service.cli.console import WrongInputError, say, show_table, warning_lines, write_json
 from sprag_study.service.cli.described import parameter, signed
-from sprag_study.service.cli.file_formats import file_format
+from sprag_study.service.cli.file_formats import file_format, require_csv
 from sprag_study.service.cli.files import read_study, write_pieces
 from sprag_study.service.cli.names import study_of
 from sprag_study.service.cli.options import SHARED
 from sprag_study.service.cli.remote import connection
 from sprag_study.service.cli.running import run_parsed
 from sprag_study.service.cli.shown import heading
+from sprag_study.service.cli.sources import SpecOrStudy, is_study, refuse_local
+
+if TYPE_CHECKING:
+    from sprag_study.service.formats import Decimal
+    from sprag_study.service.spec.document import ParsedSpec
 
 _Statement = Annotated[
     str,
@@ -28,31 +33,46 @@ _Statement = Annotated[
     ),
 ]
 
+_SHARED: Final = ("file", "units", "decimal", "points_file", "tables", "db", "processes")
+
 
 def _sql(
-    study: str, statement: str, file: str | None, units: str | None, db: str | None, processes: int | None
-) -> None:
+    study: str, statement: str, file: str | None, units: str | None, decimal: Decimal | None,
+    points_file: str | None, tables: list[str] | None, db: str | None, processes: int | None,
+) -> None:  # fmt: skip
     from sprag_study.service.client.errors import StatementError
     from sprag_study.service.client.statements import CASES, read_only, selected
 
     form = None if file is None else file_format(file, ("csv",))
+    require_csv(None, decimal, form)
     try:
         read_only(statement)  # before anything is run
-        frame: Any = selected(statement, {CASES: _rows(study, units, db, processes)}, polars=False)
+        if is_study(study):
+            refuse_local(points_file=points_file, tables=tables, db=db, processes=processes)
+            parquet = _of_service(study, units)
+        else:
+            parquet = _of_spec(read_study(study, points_file, files=tables), units, db, processes)
+        frame: Any = selected(statement, {CASES: parquet}, polars=False)
     except StatementError as error:
         raise WrongInputError("invalid-parameter", str(error)) from error
-    heads = [heading(name, frame.attrs["units"].get(name, "1")) for name in frame.columns]
+    _show(frame, file, form, decimal)
+
+
+def _show(frame: Any, file: str | None, form: str | None, decimal: Decimal | None) -> None:
+    heads = {name: heading(name, frame.attrs["units"].get(name, "1")) for name in frame.columns}
     rows = [[_plain(cell) for cell in row] for row in frame.astype(object).itertuples(index=False)]
     if file is not None and form is not None:
-        texts = type(frame)([[_text(cell) for cell in row] for row in rows], columns=heads, dtype=object)
-        write_pieces(file, [texts.to_csv(index=False, lineterminator="\n").encode()])
+        texts = frame.map(_text).rename(columns=heads)
+        signs = {"sep": ";", "decimal": ","} if decimal == "comma" else {}
+        text = texts.to_csv(index=False, lineterminator="\n", **signs)
+        write_pieces(file, [text.encode("utf-8-sig" if signs else "utf-8")])
         say_file(file, form)
     if wants_json():
         columns = [{"name": name, "unit": frame.attrs["units"].get(name)} for name in frame.columns]
         write_json({"columns": columns, "rows": rows})
     elif file is None:
         numeric = [kind.kind in "iuf" for kind in frame.dtypes]
-        show_table("", list(zip(heads, numeric, strict=True)), [[_text(cell) for cell in row] for row in rows])
+        show_table("", list(zip(heads.values(), numeric, strict=True)), [[_text(cell) for cell in row] for row in rows])
 
 
 def _plain(cell: Any) -> Any:
@@ -69,22 +89,24 @@ def _plain(cell: Any) -> Any:
 
 def _text(cell: Any) -> Any:
     """A cell for tables: the items of a list behind each other, as they show flags."""
-    return ", ".join(map(str, cell)) if isinstance(cell, list) else cell
+    plain = cell.tolist() if hasattr(cell, "dtype") else cell
+    return ", ".join(map(str, plain)) if isinstance(plain, list) else cell
 
 
-def _rows(study: str, units: str | None, db: str | None, processes: int | None) -> bytes:
-    """All rows as a Parquet file: of a study of the service, or of a spec, which is run here first."""
-    if is_study(study):
-        refuse_local(db=db, processes=processes)
-        from sprag_study.service.client import Study
+def _of_service(study: str, units: str | None) -> bytes:
+    """All rows of a study of the service as a Parquet file."""
+    from sprag_study.service.client import Study
 
-        with connection() as client:
-            return Study(client, study_of(client, study)).download("parquet", units)
+    with connection() as client:
+        return Study(client, study_of(client, study)).download("parquet", units)
+
+
+def _of_spec(parsed: ParsedSpec, units: str | None, db: str | None, processes: int | None) -> bytes:
+    """All rows of the study of a spec, which is run here first, as a Parquet file."""
     from sprag_study.service.reading.quantities import SI
     from sprag_study.service.views.library import Library
     from sprag_study.service.views.row_files import pieces
 
-    parsed = read_study(study)
     say(*warning_lines(parsed.warnings))
     settings = read_settings(database=db, processes=processes)
     with run_parsed(parsed, settings, lambda _now: "", db=db, processes=processes) as done:
@@ -96,6 +118,6 @@ sql = signed(
     "What a statement of SQL selects from the rows of a study, whose columns are those of its tables.",
     [
         parameter("study", SpecOrStudy, ...), parameter("statement", _Statement, ...),
-        *(parameter(name, SHARED[name], None) for name in ("file", "units", "db", "processes")),
+        *(parameter(name, SHARED[name], None) for name in _SHARED),
     ],
 )  # fmt: skip

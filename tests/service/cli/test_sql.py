@@ -51,6 +51,9 @@ def test_rows_of_a_study_by_sql(sprag: Callable[..., Finished], sources: tuple[s
     read = list(csv.reader(file.read_text().splitlines()))
     assert read[0][3] == "shaft.speed.mean [rad/s]"
     assert [float(row[3]) for row in read[1:]] == [row[3] for row in shown["rows"]]
+    done = sprag("show", sources[0], "sql", STATEMENT, "-o", file, "--decimal", "comma")
+    assert file.read_text(encoding="utf-8-sig").splitlines()[2].startswith("1;;0,1;")
+    assert sprag("show", sources[1], "sql", STATEMENT, "--decimal", "comma").code == 2
 
 
 def test_a_wrong_statement_is_wrong_input(sprag: Callable[..., Finished], sources: tuple[str, str]) -> None:
