@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections import Counter
 from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, assert_never
@@ -24,6 +25,7 @@ from sprag_study.worker.ports import (
 from sprag_study.worker.reports import Reporter
 from sprag_study.worker.reuse import no_cases, taken
 from sprag_study.worker.rounds import PlanError, Rounds
+from sprag_study.worker.stages import Stage, Stages
 from sprag_study.worker.states import StudyState
 
 if TYPE_CHECKING:
@@ -77,7 +79,8 @@ class Dispatcher:
         self._reporter = Reporter()
         self._studies: dict[int, Study] = {}
         self._ids: dict[int, str] = {}
-        self._opening = Opening(store, clock, only)
+        self._stages = Stages(store, clock)
+        self._opening = Opening(store, clock, only, self._stages)
         #: By ticket: cases of a chunk in flight that the store already has; and outcomes of chunks it has completely.
         self._known: dict[int, Known] = {}
         self._had_all: list[Outcome] = []
@@ -108,7 +111,9 @@ class Dispatcher:
             try:
                 with suppress(EpochLostError, StoreFullError):
                     self._store.release(self._epoch)
+                    self._stages.keep()
             finally:
+                self._stages.close()
                 self._executor.close()
                 if self._news is not None:
                     self._news.close()
@@ -123,6 +128,7 @@ class Dispatcher:
             if now >= self._next_beat:
                 report = self._reporter.summary(self._executor.report(), self._machine.in_flight, now)
                 self._store.heartbeat(self._epoch, report)
+                self._stages.keep()
                 self._next_beat = now + HEARTBEAT_SECONDS
             if now >= self._next_poll or (self._news is not None and self._news.wait(0.0)):
                 self._poll()
@@ -137,6 +143,7 @@ class Dispatcher:
                     self._next_poll = now
                 timeout = 0.0
             for outcome in (*at_once, *self._executor.wait(timeout)):
+                self._stages.chunk_ended(outcome)
                 known = self._known.pop(outcome.ticket, None)
                 for instruction in self._machine.handle(dispatch.Ended(outcome.ticket, outcome.fate, outcome.detail)):
                     if isinstance(instruction, dispatch.Commit):
@@ -224,6 +231,7 @@ class Dispatcher:
         self._opening.stop_waiting(number)
         self._handle(dispatch.Paused(number))
         if number not in self._machine.studies and self._opening.adopted(study):
+            self._stages.keep()
             self._store.time_is_over(self._epoch, number)
             self._say("The deadline of the study %s has passed.", number)
             self._forget(number)
@@ -234,6 +242,7 @@ class Dispatcher:
         try:
             if number not in self._studies:
                 self._studies[number] = self._store.study_of(number)
+            self._stages.opened(study, self._studies[number])
             return self._opening.loaded(number, self._studies[number], self._executor)
         except (KernelError, UnreadableStudyError) as error:
             self._opening.stop_waiting(number)
@@ -255,6 +264,7 @@ class Dispatcher:
     def _forget(self, number: int) -> None:
         self._studies.pop(number, None)
         self._rounds.forget(number)
+        self._stages.closed(number)
         self._opening.forget(number)
 
     def _begin_again(self, number: int, reason: str) -> None:
@@ -301,7 +311,11 @@ class Dispatcher:
         self._waiting_cases = 0
         if not (finished or runs):
             return
-        claimed = set(self._store.exchange(self._epoch, finished, [run.chunk for run in runs])[1])
+        written = Counter[int]()
+        for item in finished:
+            written[item.chunk.study] += item.chunk.count
+        with self._stages.stage(Stage.WRITING, written):
+            claimed = set(self._store.exchange(self._epoch, finished, [run.chunk for run in runs])[1])
         if finished:
             self._full_delay = FULL_SECONDS[0]
         for run in runs:
@@ -315,21 +329,26 @@ class Dispatcher:
         """Start the cases of the chunk that no other study has."""
         study = self._studies[chunk.study]
         known = self._store.known(study, chunk)
-        if known is None:
-            self._executor.submit(ticket, study, chunk)
-            return
-        self._known[ticket] = known
-        if known.missing.size:
-            self._executor.submit(ticket, taken(study, known.missing), Chunk(chunk.study, 0, known.missing.size))
-        else:
+        cases = chunk.count if known is None else known.missing.size
+        if known is not None:
+            self._known[ticket] = known
+        if not cases:
             self._had_all.append(Outcome(ticket, Fate.DONE, no_cases(study)))
+            return
+        with self._stages.chunk(ticket, chunk, cases):
+            if known is None:
+                self._executor.submit(ticket, study, chunk)
+            else:
+                self._executor.submit(ticket, taken(study, known.missing), Chunk(chunk.study, 0, cases))
 
     def _settle(self, number: int) -> None:
         """End a study without open chunks, or let it choose its next ones."""
+        self._stages.keep()  # as soon as it has ended, others read how long it took
         study = self._studies.get(number)
         if study is not None and study.plan is not None:
             try:
-                appended = self._rounds.advance(self._epoch, number, study)
+                with self._stages.stage(Stage.PLANNING, {number: study.cases}):
+                    appended = self._rounds.advance(self._epoch, number, study)
             except (PlanError, UnreadableStudyError) as error:
                 self._hold(number, str(error))
                 return
@@ -339,6 +358,7 @@ class Dispatcher:
                 again = dispatch.Offered(number) if polled is None else offered(polled)
                 self._handle(replace(again, chunks=appended.chunks, proven=True))
                 return
+        self._stages.keep()
         ended = self._store.settle(self._epoch, number)
         self._say("The study %s is %s.", number, ended.value)
         self._forget(number)

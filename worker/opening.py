@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING
 from sprag_study.sentences import Sentence
 from sprag_study.worker import fingerprint
 from sprag_study.worker.sharing import gives, takes
+from sprag_study.worker.stages import Stage
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from sprag_study.worker.ports import ActiveStudy, Clock, Executor, Peer, Store
+    from sprag_study.worker.stages import Stages
     from sprag_study.worker.study import Study
 
 #: Number of studies active at the same time; the others wait in order of submission. Each owner may have one, however
@@ -27,16 +29,19 @@ COMPILING = Sentence(
 class Opening:
     """Studies on their way to being run. ``only``: the number of the only one to be run."""
 
-    def __init__(self, store: Store, clock: Clock, only: int | None) -> None:
+    def __init__(self, store: Store, clock: Clock, only: int | None, stages: Stages) -> None:
         self.epoch = 0
         #: Every study as it was polled last.
         self.polled: dict[int, ActiveStudy] = {}
         self._store = store
         self._clock = clock
         self._only = only
+        self._stages = stages
         #: Studies waiting for their kernels, and those that cannot run at present; with the time when this began.
         self._compiling: dict[int, float] = {}
         self._short: dict[int, float] = {}
+        #: When a study was last found waiting for its kernel.
+        self._asked: dict[int, float] = {}
         #: The reasons recorded on studies.
         self._notes: dict[int, str | None] = {}
         #: Number of studies of this dispatcher, and the other dispatchers, at the latest poll.
@@ -98,12 +103,18 @@ class Opening:
 
     def loaded(self, number: int, study: Study, executor: Executor) -> bool:
         """Whether the kernel of a study is loaded; if not, this is reported after a while. Raises KernelError."""
-        if executor.ready(study):
+        now = self._clock.monotonic()
+        if number in self._asked:
+            self._stages.spend(number, Stage.COMPILING, now - self._asked.pop(number))
+        with self._stages.of_study(number):
+            ready = executor.ready(study)
+        if ready:
             self._compiling.pop(number, None)
             self._notes.pop(number, None)
             self._store.note(self.epoch, number, None)  # the reason may come from an earlier dispatcher
             return True
-        now = self._clock.monotonic()
+        if executor.shortage is None:
+            self._asked[number] = now
         if now - self._compiling.setdefault(number, now) >= NOTE_SECONDS:
             self._note(number, executor.shortage or COMPILING)
         return False
@@ -129,11 +140,12 @@ class Opening:
 
     def stop_waiting(self, number: int) -> bool:
         """Let a study no longer wait for its kernel; whether it did."""
+        self._asked.pop(number, None)
         return self._compiling.pop(number, None) is not None
 
     def forget(self, number: int) -> None:
         """Drop what is known of a study."""
-        for known in (self._compiling, self._short, self._notes):
+        for known in (self._compiling, self._asked, self._short, self._notes):
             known.pop(number, None)
 
     def unnoted(self, number: int) -> None:

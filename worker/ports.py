@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from sprag_study.worker.models import ChunkResult
     from sprag_study.worker.planning.rounds import Rows
     from sprag_study.worker.reports import ExecutorReport
+    from sprag_study.worker.stages import Stage
     from sprag_study.worker.states import StudyState
     from sprag_study.worker.study import Study
 
@@ -85,6 +86,7 @@ class ActiveStudy:
     ``goes_on`` one that resumes by itself for any reason. No chunk starts after ``finish_by``. ``proven``: an earlier
     round of the study has results, which shows that the engine works. ``dispatcher`` is the epoch of the dispatcher to
     which it belongs, None for none; ``fingerprint`` that of its rows, "" where it has none, or rows of several.
+    ``trace`` is the `sprag_study.worker.traces.context` in which it was submitted.
     """
 
     number: int
@@ -99,6 +101,7 @@ class ActiveStudy:
     fingerprint: str = ""
     rank: int = 0
     owner: str | None = None
+    trace: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,6 +164,9 @@ class Store(Protocol):
 
         A missing heartbeat raises alarms but never decides ownership.
         """
+
+    def spent(self, spent: Mapping[int, Mapping[Stage, float]]) -> None:
+        """Add seconds to the stages of studies, whoever they belong to."""
 
     def active_studies(self) -> list[ActiveStudy]:
         """Studies that have not ended, by priority and then in order of submission.

@@ -119,6 +119,23 @@ class SentReport(TypedDict):
     problem: Annotated[str | None, Doc("why the last attempt failed")]
 
 
+class StageSeconds(TypedDict):
+    """A stage of a due time, and how long it took."""
+
+    stage: Annotated[
+        str,
+        Doc(
+            "waiting (until its first case), checking, compiling, computing, writing, planning (of further rounds), "
+            "interrupted (held, or nothing of it ran in between), report, sending"
+        ),
+    ]
+    seconds: Annotated[float, Doc("how long it took in all, in s; together the stages fill the time")]
+    begin: Annotated[Moment, Doc("it lies between `begin` and `end`, perhaps in parts")]
+    begin_local: Annotated[str, Doc("the same on the wall clock of the schedule's zone, with its offset")]
+    end: Moment
+    end_local: str
+
+
 class NightRun(TypedDict):
     """A due time of the last hours, and what became of it."""
 
@@ -130,6 +147,9 @@ class NightRun(TypedDict):
     study: Annotated[str | None, Doc("id of its study; null where there is none, or it was deleted")]
     outcome: RunOutcome
     reports: list[SentReport]
+    stages: Annotated[
+        list[StageSeconds] | None, Doc("what took how long, from the due time on; null until the run is over")
+    ]
 
 
 class LateRun(TypedDict):

@@ -8,7 +8,15 @@ import typer
 
 from sprag_study.service.cli import completion
 from sprag_study.service.cli.common import wants_json
-from sprag_study.service.cli.console import ExitCode, WrongInputError, say, show_table, write_json, wrong_option
+from sprag_study.service.cli.console import (
+    ExitCode,
+    WrongInputError,
+    duration_text,
+    say,
+    show_table,
+    write_json,
+    wrong_option,
+)
 from sprag_study.service.cli.described import listing
 from sprag_study.service.cli.files import read_spec
 from sprag_study.service.cli.groups import Groups
@@ -16,6 +24,7 @@ from sprag_study.service.cli.names import schedule_of
 from sprag_study.service.cli.options import Fresh, SpecFile
 from sprag_study.service.cli.remote import PriorityOption, connection
 from sprag_study.service.languages import N_, _, earlier
+from sprag_study.service.schedules.stages import STAGE_NAMES
 from sprag_study.worker.limits import MAX_PRIORITY
 
 if TYPE_CHECKING:
@@ -199,6 +208,9 @@ def show(schedule_id: ScheduleId) -> None:
 @app.command()
 def night(
     hours: Annotated[float, typer.Option("--hours", min=1, max=744, help="Hours to look back on.")] = 24,
+    stages: Annotated[
+        bool, typer.Option("--stages", help="Show what took how long: waiting, compiling, computing and so on.")
+    ] = False,
 ) -> None:
     """Show what schedules did in the last hours, first what needs attention; exit code 4 if anything does."""
     with connection() as client:
@@ -210,9 +222,28 @@ def night(
         rows = [(_clock(r["due_local"]), r["name"], _(r["sentence"]), r["study"]) for r in found["late"]]
         rows += [(_clock(r["due_local"]), r["name"], _(r["outcome"]["sentence"]), r["study"]) for r in found["runs"]]
         show_table("", columns, rows)
+        if stages:
+            _show_stages(found["runs"])
         _say_off(found)
     if found["trouble"] or found["late"] or found["off"]:
         raise typer.Exit(ExitCode.NOT_ALL_OK)
+
+
+def _show_stages(runs: list[dict[str, Any]]) -> None:
+    """Show how long each stage of the runs took that are over."""
+    columns = ((_("due"), False), (_("stage"), False), (_("from"), False), (_("until"), False), (_("time"), True))
+    rows = [
+        (
+            _clock(run["due_local"]),
+            _(STAGE_NAMES[stage["stage"]]),
+            _clock(stage["begin_local"]),
+            _clock(stage["end_local"]),
+            duration_text(stage["seconds"]),
+        )
+        for run in runs
+        for stage in run["stages"] or ()
+    ]
+    show_table("", columns, rows)
 
 
 @app.command()

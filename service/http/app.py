@@ -96,6 +96,7 @@ from sprag_study.service.storage.readiness import Readiness
 from sprag_study.service.storage.store import Store
 from sprag_study.service.views import row_files
 from sprag_study.service.views.library import Library
+from sprag_study.worker import traces
 from sprag_study.worker.chunking import Chunking
 from sprag_study.worker.limits import (
     COMPUTATION_BYTES,
@@ -194,7 +195,8 @@ class Application(FastAPI):
     """FastAPI with the guard as outermost layer, outside its own error pages."""
 
     def __init__(self, settings: Settings, access: Access, metrics: Metrics, **options: Any) -> None:
-        super().__init__(**options)
+        # FastAPI has its own spans for requests.
+        super().__init__(telemetry={"tracer_provider": traces.provider()}, **options)
         self._settings = settings
         self._access = access
         self._metrics = metrics

@@ -17,7 +17,7 @@ from sprag_study.sentences import Amount, Sentence
 from sprag_study.service.faults import Kind
 from sprag_study.service.http.problems import ApiError
 from sprag_study.service.http.shares import not_in_time
-from sprag_study.worker import models
+from sprag_study.worker import models, traces
 from sprag_study.worker.limits import LOAD_SECONDS, PIECE_SECONDS, WALL_TIMES
 from sprag_study.worker.pool.child_pool import ChildPool, Job, JobStoppedError
 from sprag_study.worker.pool.child_process import KILL_SECONDS, ProcessDiedError, ProcessStartError, send_piece
@@ -171,7 +171,13 @@ class ProcessComputer:
         with self._turn(wall, again=False):
             with self._lock:
                 job = self._started().stream(
-                    wall, pieces.receive, within_processor_time, self._limits.seconds, _send_all, function, args
+                    wall,
+                    pieces.receive,
+                    within_processor_time,
+                    self._limits.seconds,
+                    traces.carried("write rows", _send_all),
+                    function,
+                    args,
                 )
             job.future.add_done_callback(pieces.end)
             future = asyncio.wrap_future(job.future)
@@ -222,7 +228,8 @@ class ProcessComputer:
     async def _loaded(self, shape: models.KernelShape) -> None:
         loading = self._loads.get(shape)
         if loading is None or (loading.future.done() and loading.future.exception() is not None):
-            loading = self._loads[shape] = self._schedule(LOAD_SECONDS, self._load, shape)
+            load = traces.carried("load kernel", self._load)
+            loading = self._loads[shape] = self._schedule(LOAD_SECONDS, load, shape)
         future = asyncio.wrap_future(loading.future)
         future.add_done_callback(_retrieve)  # nobody else retrieves the result for a cancelled request
         await asyncio.shield(future)

@@ -24,6 +24,7 @@ from sprag_study.service.http.timeouts import READING
 from sprag_study.service.http.tls import LOOK_SECONDS, Certificate
 from sprag_study.service.jobs.dispatching import start_dispatcher_process, worker_settings
 from sprag_study.service.settings import Settings
+from sprag_study.worker import traces
 from sprag_study.worker.limits import MAX_CONNECTIONS
 
 _LOG = logging.getLogger("sprag.service")
@@ -242,6 +243,7 @@ def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) 
     CertificateError and AddressError, each with one sentence, before anything is started.
     """
     logs.configure(settings.log_format, requests=settings.log_requests)
+    traces.start()
     certificate = Certificate.of(settings)
     app = create_app(settings)  # initialises the database before the dispatcher opens it
     listener = _listen(settings)
@@ -280,6 +282,7 @@ def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) 
                 server.run(sockets=[listener])
         finally:
             supervisor.stop()
+            traces.stop()
             server.ended()
         if server.failure is not None:
             raise server.failure

@@ -23,7 +23,7 @@ from sprag_study.service.languages.elsewhere import speak
 from sprag_study.service.results.start_states import check_start
 from sprag_study.service.spec.machine.shaft_check import NotCompiledError
 from sprag_study.service.storage.database.session import in_one_moment
-from sprag_study.worker import models
+from sprag_study.worker import models, traces
 from sprag_study.worker.limits import FILE_WAIT_SECONDS
 
 if TYPE_CHECKING:
@@ -89,13 +89,17 @@ class Work:
         quota = self._grant.checks
         most = (context.settings.user_checks if quota is None else quota) if self._grant.user is not None else 0
         return await self._attended(
-            self._in_turn(context.check_shares, context.checker, most, in_one_moment, function, *args)
+            self._in_turn(
+                context.check_shares, context.checker, most, in_one_moment, traces.carried("check", function), *args
+            )
         )
 
     async def compute(self, function: Callable[[*Args], R], *args: *Args) -> R:
         """The value of a function of the engine."""
         context = self.context
-        return await self._attended(self._in_turn(context.compute_shares, context.computer, 0, function, *args))
+        return await self._attended(
+            self._in_turn(context.compute_shares, context.computer, 0, traces.carried("compute", function), *args)
+        )
 
     async def kept_file(self, tag: str, function: Callable[[*Args, str, str], None], *args: *Args) -> BinaryIO:
         """The kept file of a tag, open for reading, which a process writes first where it is not there.
@@ -106,7 +110,7 @@ class Work:
         context, owner = self.context, self._grant.share
 
         async def write(path: str, folder: str) -> None:
-            await context.writer.run(function, *args, path, folder)
+            await context.writer.run(traces.carried("write file", function), *args, path, folder)
 
         own_turn = partial(context.file_shares.take, owner, seconds=FILE_WAIT_SECONDS)
         return await self._attended(context.files.opened(tag, owner, own_turn, write))

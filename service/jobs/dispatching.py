@@ -28,7 +28,7 @@ from sprag_study.service.storage.part import SILENT_SECONDS, SystemClock
 from sprag_study.service.storage.people.people import Quota, quota_of
 from sprag_study.service.storage.readiness import LOCKED_SECONDS
 from sprag_study.service.storage.store import Store
-from sprag_study.worker import models
+from sprag_study.worker import models, traces
 from sprag_study.worker.chunking import Chunking
 from sprag_study.worker.dispatcher import Dispatcher
 from sprag_study.worker.pool.processes import end_with_parent, ignore_interrupts, interrupts_held_back
@@ -150,6 +150,7 @@ def run_dispatcher(
 
     Raises StoreError (EpochLostError when another dispatcher took over) and ExecutorError, each with one sentence.
     """
+    traces.start()
     chunking = Chunking(settings.chunk_cases, settings.processes, settings.chunk_timeout)
     with Store.open(settings.database_url, chunking=chunking, create=False) as store:
         store.require_sound()
@@ -184,6 +185,7 @@ def run_dispatcher(
         finally:
             chores.stop()
             lock.release()
+            traces.stop()
 
 
 def _possible(store: Store, plan: MaintenancePlan, say: Callable[[str], None]) -> MaintenancePlan:

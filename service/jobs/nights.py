@@ -8,17 +8,20 @@ from typing import TYPE_CHECKING, Final
 
 from sprag_study.sentences import Sentence
 from sprag_study.service.answers import filled
-from sprag_study.service.answers.schedules import Night, NightRun, RunOutcome, SentReport
+from sprag_study.service.answers.schedules import Night, NightRun, RunOutcome, SentReport, StageSeconds
 from sprag_study.service.delivery import origin_of
 from sprag_study.service.jobs.reports.watchdog import late_json, late_runs
 from sprag_study.service.json_text import timestamp
 from sprag_study.service.languages import recorded
+from sprag_study.service.schedules.stages import report_stages, study_stages
 from sprag_study.service.schedules.times import local_time
 from sprag_study.service.schedules.trouble import usual_flags
 from sprag_study.service.storage.errors import StudyNotFoundError
 from sprag_study.worker import models
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from sprag_study.service.schedules.outcomes import Outcome
     from sprag_study.service.storage.schedules.reports import ReportRecord
     from sprag_study.service.storage.schedules.runs import EndedRun
@@ -43,7 +46,7 @@ def whole_outcome(store: Store, run: EndedRun | Run) -> Outcome:
         return outcome
     try:
         study, progress = store.studies.look(outcome.study)
-        kinds = store.rows.kinds(outcome.study)
+        kinds, times = store.rows.kinds(outcome.study), store.times.of_study(outcome.study)
     except StudyNotFoundError:  # it was deleted in the meantime
         return outcome
     usual = usual_flags(study.model)
@@ -58,6 +61,7 @@ def whole_outcome(store: Store, run: EndedRun | Run) -> Outcome:
         },
         trouble_flags=trouble,
         coverage=None if progress.covered is None else progress.covered.sentence,
+        stages=study_stages(run.due, times, outcome.ended_at or store.clock.now()),
     )
 
 
@@ -75,6 +79,26 @@ def report_json(report: ReportRecord) -> SentReport:
     """A report for answers; the path of a webhook can be a secret of its receiver."""
     target = origin_of(report.target) or "" if report.channel == "webhook" else report.target
     return filled(SentReport, report, target=target)
+
+
+def _stages(run: Run, reports: Iterable[ReportRecord]) -> list[StageSeconds] | None:
+    """What took how long, from the due time until the last report was sent; None until that is known."""
+    outcome = run.outcome
+    if outcome.stages is None:
+        return None
+    stages = outcome.stages
+    if outcome.ended_at is not None and run.concluded_at is not None:
+        sent = (report.ended_at for report in reports if report.kind == "run" and report.ended_at is not None)
+        stages += report_stages(outcome.ended_at, run.concluded_at, sent)
+    return [
+        filled(
+            StageSeconds,
+            stage,
+            begin_local=local_time(stage.begin, run.zone),
+            end_local=local_time(stage.end, run.zone),
+        )
+        for stage in stages
+    ]
 
 
 def why_off(store: Store) -> str | None:
@@ -96,6 +120,7 @@ def night(store: Store, hours: float = HOURS) -> Night:
             due_local=local_time(run.due, run.zone),
             outcome=outcome_json(run.outcome),
             reports=[report_json(report) for report in sent.get((run.schedule, run.due), ())],
+            stages=_stages(run, sent.get((run.schedule, run.due), ())),
         )
         for run in sorted(found, key=lambda run: not run.outcome.trouble)
     ]

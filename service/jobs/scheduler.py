@@ -21,6 +21,8 @@ from sprag_study.service.languages.earlier import sentence_in
 from sprag_study.service.schedules.policies import Overlap, due_times
 from sprag_study.service.storage.errors import RunClosedError, StudyNotFoundError
 from sprag_study.service.storage.part import moment
+from sprag_study.worker import traces
+from sprag_study.worker.stages import Stage
 from sprag_study.worker.states import TransitionError
 
 if TYPE_CHECKING:
@@ -74,7 +76,8 @@ class Scheduler(PollingThread):
                 if _is_over(run, now):
                     self._give_up(run)
                 elif self._store.clock.monotonic() >= self._next_try.get((run.schedule, run.due), 0.0):
-                    self._submit(run)
+                    with traces.span("schedule run", {traces.SCHEDULE: run.id}, parent=""):
+                        self._submit(run)
         for study in self._store.schedules.bound_studies():
             with act_as(_actor(study.schedule)):
                 self._apply_window(study, now)
@@ -128,6 +131,7 @@ class Scheduler(PollingThread):
 
         if not self._may_overlap(run):
             return
+        began = self._store.clock.monotonic()
         try:
             parsed = parse_spec(accepted(run.fields.spec, self._latest(run)))
             if run.fields.name:
@@ -147,6 +151,8 @@ class Scheduler(PollingThread):
             self._next_try.pop((run.schedule, run.due), None)
             _LOG.info("No study is submitted: %s.", error)
             return
+        checking = self._store.clock.monotonic() - began
+        self._store.times.add({study.number: {Stage.CHECKING: checking}})
         self._next_try.pop((run.schedule, run.due), None)
         _LOG.info("The schedule %s was due: study %s.", run.id, study.id)
 

@@ -10,6 +10,7 @@ from typing import Any, Final
 from sprag_study.sentences import Sentence, sentence_of
 from sprag_study.service.languages import N_, gettext, grouped, ngettext
 from sprag_study.service.reading.reader import shown_stored
+from sprag_study.service.schedules.stages import StageTime
 
 
 class Result(StrEnum):
@@ -70,6 +71,7 @@ class Outcome:
     ended_at : end of its study, or of the run without one
     seconds : from the first chunk of its study to its end
     trouble_flags : flags that count as trouble of this run; None until they have been counted
+    stages : what took how long until the end of its study; None until the run is over and that has been read
     """
 
     result: Result
@@ -86,6 +88,7 @@ class Outcome:
     ended_at: datetime | None = None
     seconds: float | None = None
     trouble_flags: tuple[str, ...] | None = None
+    stages: tuple[StageTime, ...] | None = None
 
     @property
     def trouble(self) -> bool:
@@ -132,7 +135,9 @@ class Outcome:
     def to_json(self) -> dict[str, Any]:
         """The outcome as `of_json` reads it."""
         ended = None if self.ended_at is None else self.ended_at.isoformat()
-        return {**asdict(self), "result": self.result.value, "ended_at": ended, **self.sentences}
+        stages = None if self.stages is None else [stage.to_json() for stage in self.stages]
+        own = {"result": self.result.value, "ended_at": ended, "stages": stages}
+        return {**asdict(self), **own, **self.sentences}
 
     @property
     def sentences(self) -> dict[str, Any]:
@@ -149,6 +154,7 @@ class Outcome:
             "result": Result(data["result"]),
             "ended_at": None if ended is None else datetime.fromisoformat(ended),
             "trouble_flags": None if flags is None else tuple(flags),
+            "stages": None if data.get("stages") is None else tuple(map(StageTime.of_json, data["stages"])),
         }
         values = {name: data[f"{name}_values"] for name in ("reason", "coverage") if f"{name}_values" in data}
         own |= {name: sentence_of(value) for name, value in values.items()}

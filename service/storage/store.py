@@ -22,6 +22,7 @@ from sprag_study.service.storage.schedules.reports import Reports
 from sprag_study.service.storage.schedules.runs import Runs
 from sprag_study.service.storage.schedules.schedules import Schedules
 from sprag_study.service.storage.studies.purging import Purging
+from sprag_study.service.storage.studies.stages import TimesByStage
 from sprag_study.service.storage.studies.studies import Studies
 from sprag_study.service.storage.work.dispatchers import Dispatchers
 from sprag_study.service.storage.work.room import Room
@@ -60,7 +61,10 @@ class Store:
         self.reuse = Reuse(session, clock, orders, self.digests)
         self.studies = Studies(session, clock, self.people, self.dispatchers, orders, self.digests)
         self.purging = Purging(session, clock, self.studies)
-        self.work = Work(session, clock, self.dispatchers, orders, self.digests, self.rows, self.reuse, self.room)
+        self.times = TimesByStage(session, clock)
+        self.work = Work(
+            session, clock, self.dispatchers, orders, self.digests, self.rows, self.reuse, self.room, self.times
+        )
 
     @classmethod
     def open(

@@ -93,6 +93,8 @@ STUDIES = sa.Table(
     sa.Column("digest", sa.BigInteger),
     # The values of `reason` (`sprag_study.service.storage.stored_sentences`).
     sa.Column("reason_values", sa.Text),
+    # The span that submitted it (`sprag_study.worker.traces`); "" where there were no traces.
+    sa.Column("trace", sa.String(55), nullable=False, server_default=""),
     sa.Index("ix_studies_kin_hash_keyed", "kin_hash", "keyed"),
     sqlite_autoincrement=True,
 )
@@ -112,7 +114,7 @@ COARSE_TO_FINE, LINE_BY_LINE = 1, 2
 #: Long texts, and what only the storage needs.
 _BESIDE = frozenset(
     {"spec", "study", "search", "deleted_at", "kin_hash", "fresh", "fingerprint", "estimated_bytes", "dispatcher"}
-    | {"rank", "keyed", "digest"}
+    | {"rank", "keyed", "digest", "trace"}
 )
 #: The columns of a `StudyRecord`.
 RECORD_COLUMNS = tuple(column for column in STUDIES.c if column.name not in _BESIDE)
@@ -166,6 +168,16 @@ ENDINGS = sa.Table(
     sa.Column("study", sa.Integer, sa.ForeignKey("studies.number"), primary_key=True),
     sa.Column("ending", sa.String(40), primary_key=True),
     sa.Column("cases", sa.Integer, nullable=False),
+    sqlite_with_rowid=False,
+)
+
+#: Seconds of the stages of studies that are measured (`sprag_study.worker.stages`), added to as they pass.
+STAGES = sa.Table(
+    "stages",
+    METADATA,
+    sa.Column("study", sa.Integer, sa.ForeignKey("studies.number"), primary_key=True),
+    sa.Column("stage", sa.String(12), primary_key=True),
+    sa.Column("seconds", sa.Double, nullable=False),
     sqlite_with_rowid=False,
 )
 

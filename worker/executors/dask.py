@@ -23,7 +23,7 @@ import dask
 from distributed.scheduler import KilledWorker
 
 from sprag_study.sentences import Sentence, joined
-from sprag_study.worker import fingerprint, models
+from sprag_study.worker import fingerprint, models, traces
 from sprag_study.worker.executors import dask_tasks as tasks
 from sprag_study.worker.executors.dask_jobs import Job, Waiting, Worker, outcome_of, refusals, report_of
 from sprag_study.worker.executors.dask_link import CONFIG, Link, own_cluster, value_of
@@ -161,7 +161,7 @@ class DaskExecutor:
         task = models.chunk_task(study, chunk.first, chunk.count)
         key = f"sprag-{chunk.study}-{chunk.first}-{chunk.count}-{chunk.failures}-{self._name}-{ticket}"
         with self._lock:
-            self._waiting.append(Waiting(ticket, key, task))
+            self._waiting.append(Waiting(ticket, key, traces.carried("run chunk", self._run), task))
             self._fill()
 
     def wait(self, timeout: float) -> list[Outcome]:
@@ -324,7 +324,7 @@ class DaskExecutor:
             if chosen is not None:
                 self._waiting.remove(chosen)
                 job = Job("chunk", time.monotonic(), chosen.ticket)
-                given = (self._digest, self._run, chosen.task, self._timeout, self._wall)
+                given = (self._digest, chosen.run, chosen.task, self._timeout, self._wall)
                 self._begin(worker, job, chosen.key, tasks.run_chunk, *given)
                 continue
             shape = next((s for item in self._waiting if (worker.host, s := item.task.shape) not in self._unable), None)
@@ -336,7 +336,8 @@ class DaskExecutor:
 
     def _begin_load(self, worker: Worker, shape: models.KernelShape) -> None:
         key = f"sprag-load-{self._name}-{uuid4().hex}"
-        given = (self._digest, self._load, shape, self._discards.get(worker.host, ""))
+        load = traces.carried("load kernel", self._load)
+        given = (self._digest, load, shape, self._discards.get(worker.host, ""))
         self._begin(worker, Job("load", time.monotonic(), shape=shape), key, tasks.load_kernel, *given)
 
     def _begin(self, worker: Worker, job: Job, key: str, function: Callable[..., Any], *given: Any) -> None:

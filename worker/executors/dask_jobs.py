@@ -14,7 +14,7 @@ from sprag_study.worker.ports import Fate, Outcome
 from sprag_study.worker.reports import ExecutorReport, WorkerReport
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
     from distributed import Future
 
@@ -90,10 +90,11 @@ class Worker:
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """A chunk that no worker has yet."""
+    """A chunk that no worker has yet; ``run`` is to be called for its ``task``."""
 
     ticket: int
     key: str
+    run: Callable[[models.ChunkTask], models.ChunkResult]
     task: models.ChunkTask
 
 

@@ -7,7 +7,7 @@ import time
 from collections import deque
 from typing import TYPE_CHECKING
 
-from sprag_study.worker import models
+from sprag_study.worker import models, traces
 from sprag_study.worker.executors import known_answers
 from sprag_study.worker.ports import Chunk, Fate, Outcome
 from sprag_study.worker.reports import ExecutorReport, WorkerReport, processor
@@ -23,7 +23,7 @@ class InlineExecutor:
 
     def __init__(self, run: Callable[[models.ChunkTask], models.ChunkResult] = known_answers.run_task) -> None:
         self._run = run
-        self._waiting: deque[tuple[int, models.ChunkTask]] = deque()
+        self._waiting: deque[tuple[int, Callable[[models.ChunkTask], models.ChunkResult], models.ChunkTask]] = deque()
         self._stopped: list[Outcome] = []
         self._cases = 0
 
@@ -43,7 +43,8 @@ class InlineExecutor:
 
     def submit(self, ticket: int, study: Study, chunk: Chunk) -> None:
         """Queue the chunk; `wait` runs it."""
-        self._waiting.append((ticket, models.chunk_task(study, chunk.first, chunk.count)))
+        task = models.chunk_task(study, chunk.first, chunk.count)
+        self._waiting.append((ticket, traces.carried("run chunk", self._run), task))
 
     def wait(self, timeout: float) -> list[Outcome]:
         """Run the oldest chunk to its end, however long it takes."""
@@ -53,9 +54,9 @@ class InlineExecutor:
         if not self._waiting:
             time.sleep(timeout)
             return []
-        ticket, task = self._waiting.popleft()
+        ticket, run, task = self._waiting.popleft()
         try:
-            result = self._run(task)
+            result = run(task)
             self._cases += result.count
             return [Outcome(ticket, Fate.DONE, result, host=socket.gethostname())]
         except Exception as error:  # a bug, reported like the crash of a process

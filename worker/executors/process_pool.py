@@ -10,7 +10,7 @@ from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
 from sprag_study.sentences import Sentence
-from sprag_study.worker import fingerprint, models
+from sprag_study.worker import fingerprint, models, traces
 from sprag_study.worker.executors import known_answers
 from sprag_study.worker.fingerprint import prepare_as
 from sprag_study.worker.limits import LOAD_SECONDS, WALL_TIMES
@@ -116,7 +116,9 @@ class ProcessPoolExecutor:
         if shape in self._loaded or (loading is None and self._compiled(shape)):
             return True
         if shape not in self._loading and len(self._loading) < max(1, self._processes // 2):
-            self._loading[shape] = begun = self._pool.schedule(self._load_timeout, self._load, shape)
+            self._loading[shape] = begun = self._pool.schedule(
+                self._load_timeout, traces.carried("load kernel", self._load), shape
+            )
             begun.future.add_done_callback(lambda _: self._ready.put(None))
         return False
 
@@ -142,7 +144,7 @@ class ProcessPoolExecutor:
         """Start a chunk; returns at once."""
         task = models.chunk_task(study, chunk.first, chunk.count)
         self._jobs[ticket] = job = self._pool.schedule(
-            self._wall, within_processor_time, self._timeout, self._run, task
+            self._wall, within_processor_time, self._timeout, traces.carried("run chunk", self._run), task
         )
         job.future.add_done_callback(lambda done: self._ready.put(self._outcome(ticket, done)))
 

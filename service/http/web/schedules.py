@@ -35,6 +35,7 @@ from sprag_study.service.reading.reader import meanings
 from sprag_study.service.schedules.fields import AT_ALLOWED, CRON_ALLOWED, ScheduleFields, change_fields
 from sprag_study.service.schedules.plain import DAYS, cron_of, days_of, deadline_said, said
 from sprag_study.service.schedules.report_to import require_deliverable
+from sprag_study.service.schedules.stages import STAGE_NAMES
 from sprag_study.service.schedules.trouble import usual_flags
 from sprag_study.service.spec.report import SpecError
 from sprag_study.service.spec.stored import accepted
@@ -88,6 +89,7 @@ def nights(context: Ctx, hours: Annotated[float, Query(ge=1, le=MOST_HOURS)] = H
         hours=hours,
         choices=_HOURS,
         pictures=_PICTURES,
+        stage_names=STAGE_NAMES,
         said=said,
         deadline_said=deadline_said,
         **listed(context.store),

@@ -12,6 +12,7 @@ from sprag_study.service.jobs.polling import PollingThread
 from sprag_study.service.jobs.reports.channels import DeliveryError, send_mail, send_webhook
 from sprag_study.service.jobs.reports.message import mail, webhook_body
 from sprag_study.service.languages import language
+from sprag_study.worker import traces
 
 if TYPE_CHECKING:
     import ssl
@@ -48,7 +49,8 @@ class Reporter(PollingThread):
             return
         with act_as(Actor(Door.SERVICE, "reports", socket.gethostname())):
             while not self._ending.is_set() and (report := self._store.reports.claim()) is not None:
-                self._send(report)
+                with traces.span("send report", {traces.SCHEDULE: report.schedule}, parent=""):
+                    self._send(report)
 
     def _send(self, report: Claimed) -> None:
         try:

@@ -163,14 +163,17 @@ class EndedRun:
 
     schedule: int
     id: str
-    due: int
+    due: datetime
     outcome: Outcome
     trouble_flags: tuple[str, ...] | None
 
 
 @dataclass(frozen=True, slots=True)
 class NightRun:
-    """A due time with its schedule: id, name, zone and ``trouble_flags``."""
+    """A due time with its schedule: id, name, zone and ``trouble_flags``.
+
+    ``concluded_at`` is when it was found to be over; None where it has not been.
+    """
 
     schedule: str
     name: str
@@ -179,6 +182,7 @@ class NightRun:
     study: str | None
     outcome: Outcome
     trouble_flags: tuple[str, ...] | None
+    concluded_at: datetime | None
 
 
 def runs_with_studies() -> sa.FromClause:
@@ -338,27 +342,28 @@ class Runs(Part):
         )
         rows = self._all(query)
         return [
-            EndedRun(row.schedule, row.schedule_id, row.due, outcome_of(row), trouble_flags_of(row)) for row in rows
+            EndedRun(row.schedule, row.schedule_id, moment(row.due), outcome_of(row), trouble_flags_of(row))
+            for row in rows
         ]
 
     def conclude(self, run: EndedRun, outcome: Outcome) -> bool:
         """Keep the outcome of a due time, and add its reports; False when another process has done so."""
-        now = self._now()
+        now, due = self._now(), micros_of(run.due)
         if outcome.ended_at is None:
             outcome = replace(outcome, ended_at=moment(now))
         with self.session.write() as connection:
             schedule = connection.execute(sa.select(SCHEDULES).where(_S.number == run.schedule)).one()
             concluded = connection.execute(
                 sa.update(SCHEDULE_RUNS)
-                .where(_R.schedule == run.schedule, _R.due == run.due, _R.concluded_at.is_(None))
+                .where(_R.schedule == run.schedule, _R.due == due, _R.concluded_at.is_(None))
                 .values(concluded_at=now, outcome=json.dumps(outcome.to_json(), allow_nan=False))
             )
             to = report_to_of(schedule)
             if concluded.rowcount and (outcome.trouble or to.when is ReportWhen.ALWAYS):
-                content = {**about(schedule, run.due), "outcome": filled(RunOutcome, outcome), "study": outcome.study}
+                content = {**about(schedule, due), "outcome": filled(RunOutcome, outcome), "study": outcome.study}
                 # For mails in other languages than that of the sentence.
                 content["known"] = {"reason": outcome.reason, "missed": outcome.missed, **outcome.sentences}
-                add_reports(connection, now, run.schedule, run.due, "run", to.targets, content)
+                add_reports(connection, now, run.schedule, due, "run", to.targets, content)
         return bool(concluded.rowcount)
 
     def between(self, since: datetime, until: datetime, most: int) -> list[NightRun]:
@@ -380,6 +385,7 @@ class Runs(Part):
                 row.study,
                 outcome_of(row),
                 trouble_flags_of(row),
+                optional_moment(row.concluded_at),
             )
             for row in rows
         ]

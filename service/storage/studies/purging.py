@@ -19,6 +19,7 @@ from sprag_study.service.storage.tables import (
     ENDINGS,
     HELD_AT_DEADLINE,
     ROUNDS,
+    STAGES,
     STUDIES,
     further_table,
     results_table,
@@ -119,7 +120,7 @@ class Purging(Part):
     def _remove(self, number: int) -> None:
         """Delete a study that has no rows any more."""
         with self.session.write() as connection:
-            for table in (ENDINGS, ROUNDS, SAVED_VIEWS):
+            for table in (ENDINGS, ROUNDS, STAGES, SAVED_VIEWS):
                 connection.execute(sa.delete(table).where(table.c.study == number))
             connection.execute(sa.delete(STUDIES).where(STUDIES.c.number == number))
 

@@ -80,6 +80,7 @@ from sprag_study.service.storage.tables import (
     STUDIES,
 )
 from sprag_study.service.storage.work.dispatchers import dispatcher_of
+from sprag_study.worker import traces
 from sprag_study.worker.chunking import spans
 from sprag_study.worker.limits import MAX_AXIS_VALUES, MAX_WAITING_STUDIES
 from sprag_study.worker.ports import Chunk
@@ -572,6 +573,7 @@ def _queued(
         "owner": acting().user,
         "search": search_text(row["name"]),
         "created_at": now,
+        "trace": traces.context(),
         "keyed": NOT_YET if "keys" not in row else TOO_MANY if row["keys"] is None else KEYED,
     }
     return {**values, "digest": digest_of_study(values)}

@@ -68,6 +68,7 @@ if TYPE_CHECKING:
     from sprag_study.service.storage.rows.order import Orders
     from sprag_study.service.storage.rows.reuse import Reuse
     from sprag_study.service.storage.rows.rows import Rows
+    from sprag_study.service.storage.studies.stages import TimesByStage
     from sprag_study.service.storage.work.chunks import Key
     from sprag_study.service.storage.work.dispatchers import Dispatchers
     from sprag_study.service.storage.work.room import Room
@@ -78,7 +79,7 @@ _C = STUDIES.c
 _ACTIVE = (
     sa.select(
         _C.number, _C.id, _C.state, _C.priority, _C.waits_for, _C.finish_by, _C.most_cases, _C.ok, _C.dispatcher,
-        _C.fingerprint, _C.rank, _C.owner,
+        _C.fingerprint, _C.rank, _C.owner, _C.trace,
     )
     .where(~ENDED, _C.waits_for.is_distinct_from(HELD_AT_DEADLINE))
     .order_by(_C.rank.desc(), _C.priority.desc(), _C.number)
@@ -132,6 +133,7 @@ class Work(Part):
         rows: Rows,
         reuse: Reuse,
         room: Room,
+        times: TimesByStage,
     ) -> None:
         super().__init__(session, clock)
         self._dispatchers, self._orders, self._digests = dispatchers, orders, digests
@@ -139,6 +141,7 @@ class Work(Part):
         self.take_over, self.end_absent = dispatchers.take_over, dispatchers.end_absent
         self.heartbeat, self.release, self.peers = dispatchers.heartbeat, dispatchers.release, dispatchers.peers
         self.adopt, self.leave = dispatchers.adopt, dispatchers.leave
+        self.spent = times.add
         self.known = reuse.known
         self.shortage, self.hold, self.let_go = room.shortage, room.hold, room.let_go
 
@@ -162,6 +165,7 @@ class Work(Part):
                 row.fingerprint or "",
                 row.rank,
                 row.owner,
+                row.trace,
             )
             for row in rows
         ]

@@ -19,7 +19,7 @@ from sprag_study.service.jobs.dispatching import WorkerSettings, pool
 from sprag_study.service.jobs.workers import worker_list
 from sprag_study.service.storage.part import SystemClock
 from sprag_study.service.storage.store import Store
-from sprag_study.worker import fingerprint, models
+from sprag_study.worker import fingerprint, models, traces
 from sprag_study.worker.chunking import Chunking
 from sprag_study.worker.dispatcher import Dispatcher
 from sprag_study.worker.executors.dask import DaskExecutor
@@ -32,6 +32,7 @@ from sprag_study.worker.reports import processor
 from sprag_study.worker.states import StudyState
 from sprag_study.worker.study import Study
 from tests.conftest import ROOT
+from tests.otlp import receiver
 from tests.worker import fakes
 from tests.worker.executors.clusters import DEADLINE, LEAVES_CONNECTIONS, Cluster, clusters
 
@@ -397,3 +398,25 @@ def test_a_cluster_of_its_own_runs_chunks() -> None:
         assert result.values.tobytes() == models.run_chunk(study, 0, 3).values.tobytes()
     finally:
         executor.close()
+
+
+def test_the_span_of_a_task_is_a_part_of_its_chunk(monkeypatch: pytest.MonkeyPatch) -> None:
+    with receiver() as otlp:
+        for name, value in otlp.environment.items():
+            monkeypatch.setenv(name, value)
+        traces.start()
+        executor = DaskExecutor("", 1, chunk_timeout=DEADLINE, run=fakes.run, load=fakes.load)  # type: ignore[arg-type]
+        try:
+            study = fakes.study(2)
+            with traces.span("study"):
+                ready(executor, study)
+            with traces.span("chunk"):
+                executor.submit(1, study, Chunk(1, 0, 2))
+            assert gather(executor, 1)[1].fate is Fate.DONE
+            (run,), (load,) = otlp.named("run chunk"), otlp.named("load kernel")
+        finally:
+            executor.close()
+            traces.stop()
+        assert otlp.above(run) == ["chunk"]
+        assert otlp.above(load) == ["study"]
+        assert run.process["process.pid"] == load.process["process.pid"] != os.getpid()

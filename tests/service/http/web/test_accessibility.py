@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Any, Final
 
 from axe_playwright_python.sync_playwright import Axe
 
 from sprag_study.service.http.roles import ROLES
+from sprag_study.service.jobs.scheduler import Scheduler
 from sprag_study.service.presets import preset_text
+from sprag_study.service.schedules.fields import read_fields
 from sprag_study.service.spec.document import load_spec
 from tests.acceptance.processes import SECONDS
 from tests.service.calibrating import calibration
@@ -109,9 +112,23 @@ def studies(service: Service) -> dict[str, str]:
     schedule = {"spec": preset("one_pendulum"), "cron": "0 22 * * 1-5", "name": LONG, "window": ["22:00", "06:00"],
                 "zone": "America/Argentina/ComodRivadavia"}  # fmt: skip
     ids |= {"SCHEDULE": service.http.post("/api/v1/schedules", json=schedule).json()["id"]}
+    night(service)
     view = {"page": "curves", "study": ids["STUDY"], "name": LONG, "in_report": True}
     assert service.http.post("/api/v1/views", json=view).status_code == 200
     return ids
+
+
+def night(service: Service) -> None:
+    """A schedule that was due a minute ago, and whose study has ended."""
+    now = datetime.now(UTC)
+    at = (now - timedelta(minutes=1)).isoformat()
+    fields = {"spec": preset("one_pendulum"), "at": at, "name": LONG, "zone": "Europe/Kyiv"}
+    service.store.schedules.create(read_fields(fields, now - timedelta(minutes=2)))
+    scheduler = Scheduler(service.store)
+    scheduler.look()
+    service.fill(service.store.studies.page().studies[0].id)
+    scheduler.look()
+    assert all(run["stages"] for run in service.get("/night")["runs"])
 
 
 def serve(page: Page, service: Service) -> None:
