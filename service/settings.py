@@ -119,6 +119,9 @@ class Settings(DeliverySettings, OidcSettings):
         description="checks of specs, fits and pictures of one user that run at the same time; 0: all but one of "
         "`SPRAG_CHECK_PROCESSES`",
     )
+    user_tokens: int = Field(
+        default=50, ge=0, le=100_000, description="valid tokens that one user may have; 0: no limit"
+    )
     processes: int = Field(default=0, ge=0, le=1024, description="processes of the pool; 0: one for each core")
     executor: str = Field(
         default="pool",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import secrets
+import sys
 from datetime import UTC, timedelta
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -10,7 +11,8 @@ import typer
 
 from sprag_study.service.cli import completion
 from sprag_study.service.cli.common import wants_json
-from sprag_study.service.cli.console import WrongInputError, say, show_table, write_json
+from sprag_study.service.cli.configured import read_settings
+from sprag_study.service.cli.console import WrongInputError, confirmed, say, show_table, write_json
 from sprag_study.service.cli.groups import Groups
 from sprag_study.service.cli.names import token_of, user_of
 from sprag_study.service.cli.options import Database
@@ -76,6 +78,7 @@ def create(
     with users_of(db) as store:
         ends = None if expires is None else store.clock.now() + timedelta(days=expires)
         owner = None if user is None else user_of(store.people, user, "--user")
+        store.people.most_tokens = read_settings().user_tokens
         secret, record = store.people.create_token(token_name(name, "--name"), scope, owner=owner, expires_at=ends)
     if wants_json():
         write_json({"database": store.session.location, "token": secret, **_json(record)})
@@ -114,14 +117,24 @@ def revoke(
             autocompletion=completion.tokens,
         ),
     ],
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask before revoking.")] = False,
     db: Database = None,
 ) -> None:
-    """Revoke a token and end the browser sessions that it started, within two seconds."""
+    """Revoke a token and end the browser sessions that it started, within two seconds; asks at a terminal."""
     from sprag_study.service.storage.errors import TokenNotFoundError
 
     with users_of(db) as store:
+        known = token_of(store.people, token_id)
+        name = next((record.name for record in store.people.tokens() if record.id == known), known)
+        if (
+            not yes
+            and sys.stdin.isatty()
+            and not confirmed(_("Revoke the token {name} ({token})?", name=name, token=known))
+        ):
+            say(_("nothing is revoked"))
+            return
         try:
-            record = store.people.revoke_token(token_of(store.people, token_id))
+            record = store.people.revoke_token(known)
         except TokenNotFoundError as error:
             raise WrongInputError("token-not-found", str(error)) from error
     if wants_json():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
+from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -63,6 +64,20 @@ Checks = Annotated[
 ]
 
 
+class Limit(StrEnum):
+    """A quota of a user."""
+
+    CASES = "cases"
+    STORAGE = "storage"
+    CHECKS = "checks"
+
+
+AsSet = Annotated[
+    list[Limit] | None,
+    typer.Option("--as-set", help="A quota that is again as the settings have it; can be repeated."),
+]
+
+
 @app.command()
 def add(
     name: Name,
@@ -115,15 +130,18 @@ def change(
     cases: Cases = None,
     storage: Storage = None,
     checks: Checks = None,
+    as_set: AsSet = None,
     db: Database = None,
 ) -> None:
     """Change the role or the quotas of a user, within two seconds; options that are not given keep their values."""
-    if role is None and cases is None and storage is None and checks is None:
+    if role is None and cases is None and storage is None and checks is None and not as_set:
         raise WrongInputError(
             "invalid-parameter", _("nothing to change; `sprag admin user change --help` lists the options")
         )
     with users_of(db) as store:
-        record = store.people.change_user(user_of(store.people, name), role, _quota(cases, storage, checks))
+        quota, known = _quota(cases, storage, checks), user_of(store.people, name)
+        again = ["bytes" if limit is Limit.STORAGE else limit.value for limit in as_set or ()]
+        record = store.people.change_user(known, role, quota, as_set=again)
     _show(store, record, _("{name} is changed: {role}", name=record.name, role=record.role))
 
 

@@ -284,6 +284,7 @@ def create_app(
             used_store.close()
         raise
     used_store.people.default_quota = quota_of(settings)
+    used_store.people.most_tokens = settings.user_tokens
     used_store.studies.restorable = timedelta(days=settings.restore_days)
     access = Access(settings, used_store.people)
     used_computer, used_checker = computer or _computer(settings), checker or _checker(settings)

@@ -91,7 +91,7 @@ _DESIGNER: Final = (
     f"POST {_PAGE}/extend",
     f"POST {_PAGE}/delete", f"POST {_PAGE}/longer/{{kind}}", f"POST {_PAGE}/narrow", f"POST {_PAGE}/{{verb}}",
     f"POST {_PAGE}/rows/longer",
-    "POST /me/tokens",
+    "GET /me/tokens", "POST /me/tokens",
     "POST /nights/new", "POST /nights/{schedule_id}", "POST /nights/{schedule_id}/{verb}",
 )  # fmt: skip
 _ADMINISTRATOR: Final = (

@@ -66,3 +66,6 @@ OTHER_ACCOUNT: Final = N_(
     "Another account of the provider is the user {user} already; an administrator who removes and restores the user "
     "lets this one in."
 )
+#: Why a user gets no further token.
+MANY_TOKENS: Final = N_("{user} has {count} valid tokens, the most at one time: revoke those that nothing uses.")
+TOKENS_LATELY: Final = N_("{user} was given {count} tokens within a day, the most: try again tomorrow.")

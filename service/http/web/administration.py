@@ -27,6 +27,8 @@ _MOST_DAYS: Final = 36_500
 _MIB: Final = 2**20
 #: The numbers of a quota in a form, and what each is below.
 _QUOTAS: Final = {"cases": 2**63, "storage": 2**43, "checks": 65}
+#: Their names in a quota.
+_OWN: Final = {"cases": "cases", "storage": "bytes", "checks": "checks"}
 
 
 def administers() -> bool:
@@ -54,6 +56,14 @@ def listed_tokens(
     ]
 
 
+def token_to_revoke(context: Context, token_id: str) -> tuple[TokenRecord, TokenState] | None:
+    """A token that the reader may revoke, with its state; None where there is none."""
+    every = administers()
+    owner = own_name()
+    listed = listed_tokens(context, None if every else owner) if every or owner else []
+    return next(((token, state) for token, state in listed if token.id == token_id), None)
+
+
 def change_user(context: Context, values: Mapping[str, str], *, first: bool) -> tuple[str, TokenRecord] | None:
     """Do what a form of a user asks for; raises FaultError and StoreError.
 
@@ -74,7 +84,8 @@ def change_user(context: Context, values: Mapping[str, str], *, first: bool) -> 
     if do == "change":
         if any(user.name == name and user.removed_at is not None for user in people.users()):
             raise parameter_error("name", "conflict", N_("is removed: restore this user first"), name)
-        people.change_user(name, role, quota)
+        as_set = [own for field, own in _OWN.items() if values.get(f"{field} as set")]
+        people.change_user(name, role, quota, as_set=as_set)
         return None
     if first and role is not Role.ADMINISTRATOR:
         raise parameter_error("role", "conflict", N_("of the first user must be administrator"), role)

@@ -28,6 +28,7 @@ from sprag_study.service.http.web.administration import (
     change_user,
     listed_tokens,
     own_name,
+    token_to_revoke,
 )
 from sprag_study.service.http.web.form.values import Form
 from sprag_study.service.http.web.templates import page
@@ -43,7 +44,7 @@ from sprag_study.service.reading.reader import CAPTIONS, CODES, Choice, shown_st
 from sprag_study.service.settings import DEFAULT_ORIGIN, HIDDEN, OPTION_ORIGIN
 from sprag_study.service.storage.errors import StoreError, TokenNotFoundError, UserNotFoundError
 from sprag_study.service.storage.people.audit import AuditPage, audit_filter
-from sprag_study.service.storage.people.scopes import MAX_USER_NAME
+from sprag_study.service.storage.people.scopes import MAX_USER_NAME, TokenState
 from sprag_study.service.zones import is_zone, zones
 
 if TYPE_CHECKING:
@@ -149,6 +150,24 @@ async def change_own_tokens(context: Ctx, request: Request, choice: PageChoice, 
     """Create, renew or revoke a token of the reader; a new secret stands on the page that answers, and nowhere else."""
     status, shown = await _changed(partial(change_token, context, values, every=False), request, values)
     return await in_thread(_me, context, request, choice, "/", status, **shown) if shown else _back("/me#tokens")
+
+
+@router.get("/me/tokens")
+def ask_about_token(context: Ctx, id: Annotated[str, Query(max_length=40)] = "") -> Response:
+    """The question before a token is revoked: of the reader, or of anybody for administrators."""
+    found = token_to_revoke(context, id)
+    token = found[0] if found is not None and found[1] is not TokenState.REVOKED else None
+    grant = current().grant
+    own = token is not None and token.owner is not None and token.owner == own_name()
+    return _private(
+        "token.html",
+        200 if token else 404,
+        part="/me" if own or not administers() else "/me/users",
+        token=token,
+        used_here=token is not None and grant is not None and grant.id == token.id,
+        action="/me/tokens" if own else "/me/users",
+        back="/me#tokens" if own else "/me/users#tokens",
+    )
 
 
 @router.get("/me/users")

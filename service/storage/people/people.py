@@ -32,7 +32,7 @@ from sprag_study.service.storage.schedules.tables import SCHEDULES
 from sprag_study.service.storage.tables import ENDED, HELD_AT_DEADLINE, STUDIES
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
     from datetime import datetime, timedelta
 
     from sprag_study.service.settings import Settings
@@ -48,6 +48,8 @@ WAITING_STUDY = ~ENDED & STUDIES.c.waits_for.is_distinct_from(HELD_AT_DEADLINE)
 TOKEN_PREFIX: Final = "sprag_"  # noqa: S105 - the beginning of all tokens is no secret
 _TOKEN_BYTES: Final = 32
 _KEY_BYTES: Final = 32
+#: A day in microseconds.
+_DAY: Final = 24 * 3600 * 1_000_000
 #: Primary key of the only row of the key's table.
 _ONLY: Final = 1
 
@@ -145,6 +147,8 @@ class People(Part):
 
     #: Quotas of users who have none of their own; set by the service.
     default_quota = Quota()
+    #: Valid tokens of one user; 0: no limit. Set by the service.
+    most_tokens = 0
 
     def add_user(self, name: str, role: Role, quota: Quota | None = None) -> UserRecord:
         """Add a user; raises UserExistsError, also for the name of a removed one."""
@@ -162,32 +166,38 @@ class People(Part):
         return tuple(map(_user_record, self._all(sa.select(USERS).order_by(_U.name))))
 
     def change_user(
-        self, name: str, role: Role | None = None, quota: Quota | None = None, *, removed: bool | None = None
+        self,
+        name: str,
+        role: Role | None = None,
+        quota: Quota | None = None,
+        *,
+        removed: bool | None = None,
+        as_set: Collection[str] = (),
     ) -> UserRecord:
         """Change the given fields of a user, whose studies, schedules and tokens are kept; raises UserNotFoundError.
 
-        A number of ``quota`` that is None is kept. Tokens of a removed user are worth nothing until the
-        user is restored. On pages the last administrator stays: raises FaultError.
+        A number of ``quota`` that is None is kept, but where ``as_set`` names it (cases, bytes, checks): then the
+        settings have it again. Tokens of a removed user are worth nothing until the user is restored. On pages the last
+        administrator stays: raises FaultError.
         """
         given = {column: value for column, value in _columns(quota or Quota()).items() if value is not None}
         values: dict[str, Any] = {**given, **({} if role is None else {"role": role.value})}
+        values |= {f"most_{number}": None for number in as_set}
         if removed is not None:
             values["removed_at"] = sa.func.coalesce(_U.removed_at, self._now()) if removed else None
             if not removed:  # the account at the OpenID provider may be another one by now
                 values["subject"] = None
         with self.session.write() as connection:
             _require_standing(connection, self._now())
-            row, before = None, acting().door is Door.PAGE and _is_administered(connection)
-            if values:
-                change = sa.update(USERS).where(_U.name == name).values(values).returning(USERS)
-                row = connection.execute(change).one_or_none()
-            if row is None:
+            old = connection.execute(sa.select(USERS).where(_U.name == name)).one_or_none()
+            if old is None or not values:
                 raise UserNotFoundError(name)
+            before = acting().door is Door.PAGE and _is_administered(connection)
+            row = connection.execute(sa.update(USERS).where(_U.name == name).values(values).returning(USERS)).one()
             if before and not _is_administered(connection):
                 raise parameter_error("role", "conflict", N_("is that of the last administrator"), name)
             action = "user.change" if removed is None else "user.remove" if removed else "user.restore"
-            said = {} if role is None else {"role": role.value}
-            note(connection, self._now(), action, name, **said, **_set(quota))
+            note(connection, self._now(), action, name, **_changes(old, row))
             return _user_record(row)
 
     def sign_in(self, subject: str, name: str, role: Role | None, *, create: bool) -> UserRecord:
@@ -212,13 +222,12 @@ class People(Part):
                 raise FaultError("not-allowed", Sentence(recorded.USER_REMOVED, user=row.name))
             if row.subject not in (None, subject):
                 raise FaultError("not-allowed", Sentence(recorded.OTHER_ACCOUNT, user=row.name))
-            changes = {} if role in (None, Role(row.role)) else {"role": [row.role, values["role"]]}
-            if row.subject is None or changes:
-                change = sa.update(USERS).where(_U.name == row.name).values(values).returning(USERS)
-                after = connection.execute(change).one()
-                note(connection, now, "user.change", row.name, login=row.subject is None or None, changes=changes)
-                row = after
-            return _user_record(row)
+            change = sa.update(USERS).where(_U.name == row.name).values(values).returning(USERS)
+            after = connection.execute(change).one()
+            if row.subject is None or row.role != after.role:
+                first = {"login": True} if row.subject is None else {}
+                note(connection, now, "user.change", row.name, **first, **_changes(row, after))
+            return _user_record(after)
 
     def hand_over(self, name: str, heir: str) -> tuple[int, int]:
         """Give the studies, schedules, components and views of a user to another; returns the numbers of the first two.
@@ -273,11 +282,12 @@ class People(Part):
     ) -> tuple[str, TokenRecord]:
         """Create a token; returns its secret, which cannot be shown again, and its record.
 
-        ``owner`` is the user whose token it is; raises UserNotFoundError.
+        ``owner`` is the user whose token it is; raises UserNotFoundError, and FaultError beyond `most_tokens`.
         """
         ends = None if expires_at is None else micros_of(expires_at)
         with self.session.write() as connection:
             _require_standing(connection, self._now())
+            self._require_few_tokens(connection, owner, self.most_tokens)
             fields = {"name": name, "scope": scope.value, "owner": owner}
             return _new_token(connection, self._now(), fields, ends)
 
@@ -285,7 +295,7 @@ class People(Part):
         """Another token of the same name, scope, owner and length of life; the former is valid for ``grace`` at most.
 
         Returns what `create_token` returns; raises TokenNotFoundError, also for one that was revoked or renewed, or
-        has expired, and UserNotFoundError.
+        has expired, UserNotFoundError, and FaultError beyond twice `most_tokens`.
         """
         c, now = TOKENS.c, self._now()
         valid = c.revoked_at.is_(None) & sa.func.coalesce(c.expires_at > now, sa.true())
@@ -294,11 +304,27 @@ class People(Part):
             row = connection.execute(sa.select(TOKENS).where(c.id == token_id, valid)).one_or_none()
             if row is None:
                 raise TokenNotFoundError(token_id)
+            # The former one still counts for a while, and renewing it is no way past the limit.
+            self._require_few_tokens(connection, row.owner, 2 * self.most_tokens)
             ends = None if row.expires_at is None else now + row.expires_at - row.created_at
             last = micros_of(moment(now) + grace)
             connection.execute(sa.update(TOKENS).where(c.id == token_id).values(revoked_at=last))
             same = {"name": row.name, "scope": row.scope, "owner": row.owner}
             return _new_token(connection, now, same, ends, instead_of=token_id)
+
+    def _require_few_tokens(self, connection: sa.Connection, owner: str | None, most: int) -> None:
+        """Raise FaultError where a user has ``most`` valid tokens, or was given four times as many within a day."""
+        if owner is None or not self.most_tokens:
+            return
+        c, now = TOKENS.c, self._now()
+        valid = sa.func.coalesce(c.revoked_at > now, sa.true()) & sa.func.coalesce(c.expires_at > now, sa.true())
+        today = c.created_at > now - _DAY
+        count = (sa.func.coalesce(sa.func.sum(sa.case((each, 1), else_=0)), 0) for each in (valid, today))
+        there, lately = connection.execute(sa.select(*count).where(c.owner == owner)).one()
+        if there >= most:
+            raise FaultError("quota-exceeded", Sentence(recorded.MANY_TOKENS, user=owner, count=int(there)))
+        if lately >= 4 * self.most_tokens:
+            raise FaultError("quota-exceeded", Sentence(recorded.TOKENS_LATELY, user=owner, count=int(lately)))
 
     def tokens(self) -> tuple[TokenRecord, ...]:
         """Every token ever created, newest first."""
@@ -318,7 +344,8 @@ class People(Part):
             ).one_or_none()
             if row is None:
                 raise TokenNotFoundError(token_id)
-            note(connection, self._now(), "token.revoke", token_id, name=row.name, owner=row.owner)
+            same = {"name": row.name, "owner": row.owner, "scope": row.scope}
+            note(connection, self._now(), "token.revoke", token_id, **same)
             return _token_record(row)
 
     def note_uses(self, uses: Mapping[str, int]) -> None:
@@ -402,7 +429,8 @@ def _new_token(
     token_id, owner = f"tk_{secrets.token_hex(6)}", fields["owner"]
     if owner is not None:
         require_user(connection, owner)
-    note(connection, now, "token.create", token_id, **fields, **noted)
+    expires = None if ends is None else moment(ends).isoformat()
+    note(connection, now, "token.create", token_id, **fields, expires=expires, **noted)
     digest = digest_of(secret.encode("ascii"))
     values = {**fields, "id": token_id, "digest": digest, "created_at": now, "expires_at": ends}
     row = connection.execute(sa.insert(TOKENS).values(values).returning(TOKENS)).one()
@@ -449,6 +477,14 @@ def _columns(quota: Quota) -> dict[str, int | None]:
 def _set(quota: Quota | None) -> dict[str, int]:
     """The numbers that a quota has, for the log."""
     return {name: value for name, value in _columns(quota or Quota()).items() if value is not None}
+
+
+def _changes(old: Any, new: Any) -> dict[str, dict[str, list[Any]]]:
+    """What differs in a row of a user, before and after, for the log; a quota that is None is as set."""
+    names = ("role", *_columns(Quota()))
+    changes = {name: [getattr(old, name), getattr(new, name)] for name in names}
+    changes = {name: pair for name, pair in changes.items() if pair[0] != pair[1]}
+    return {"changes": changes} if changes else {}
 
 
 def _quota(row: Any) -> Quota:

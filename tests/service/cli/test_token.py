@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Callable
 from datetime import timedelta
@@ -12,7 +13,7 @@ import pytest
 from sprag_study.service import languages
 from sprag_study.service.actor import Role
 from sprag_study.service.cli.app import execute
-from sprag_study.service.storage.people.people import digest_of
+from sprag_study.service.storage.people.people import Quota, digest_of
 from sprag_study.service.storage.people.scopes import TokenScope
 from sprag_study.service.storage.store import Store
 
@@ -111,3 +112,43 @@ def test_tokens_and_users_are_named_by_their_beginnings(settings: Settings, spra
     assert (
         sprag("admin", "user", "change", "emil", "--role", "viewer", "--json", *db).failure["code"] == "user-not-found"
     )
+
+
+def test_revoking_is_asked_about_at_a_terminal(
+    settings: Settings, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    with Store.open(settings.database_url) as store:
+        _, record = store.people.create_token("laptop", TokenScope.READ)
+
+        def run(answer: str, *more: str) -> str:
+            monkeypatch.setattr("sys.stdin", Terminal(answer))
+            assert execute(["admin", "token", "revoke", "laptop", "--db", settings.database, *more]) == 0
+            return capsys.readouterr().err
+
+        said = run("n\n")
+        assert f"Revoke the token laptop ({record.id})? [y/N]: " in said
+        assert "nothing is revoked" in said
+        assert store.people.tokens()[0].revoked_at is None
+        assert "is revoked" in run("y\n")
+        _, record = store.people.create_token("laptop 2", TokenScope.READ)
+        monkeypatch.setattr("sys.stdin", Terminal(""))
+        assert execute(["admin", "token", "revoke", record.id, "--yes", "--db", settings.database]) == 0
+        assert all(token.revoked_at is not None for token in store.people.tokens())
+
+
+def test_a_quota_is_as_set_again_and_tokens_have_a_limit(
+    settings: Settings, sprag: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    db = ("--db", settings.database)
+    with Store.open(settings.database_url) as store:
+        store.people.add_user("dora", Role.DESIGNER, Quota(5, 2**20, 2))
+    changed = sprag("admin", "user", "change", "dora", "--as-set", "cases", "--as-set", "storage", "--json", *db).data
+    assert (changed["most_cases"], changed["most_bytes"], changed["most_checks"]) == (None, None, 2)
+    monkeypatch.setenv("SPRAG_USER_TOKENS", "1")
+    assert sprag("admin", "token", "create", "--name", "a", "--user", "dora", *db).code == 0
+    refused = sprag("admin", "token", "create", "--name", "b", "--user", "dora", *db)
+    assert (refused.code, "dora has 1 valid tokens" in refused.err) == (2, True)

@@ -62,6 +62,7 @@ PAGES: Final[dict[str, list[str]]] = {
     "/problems/{slug}": ["/problems/not-found"],
     "/me/audit": ["/me/audit"],
     "/me/settings": ["/me/settings"],
+    "/me/tokens": ["/me/tokens?id=none"],
     "/me/users": ["/me/users"],
     "/nights": ["/nights"],
     "/nights/new": ["/nights/new"],

@@ -19,6 +19,7 @@ from sprag_study.service.delivery import origin_of
 from sprag_study.service.faults import FaultError
 from sprag_study.service.http.access import Access
 from sprag_study.service.storage.errors import StoreError, TokenNotFoundError
+from sprag_study.service.storage.people.audit import AuditFilter
 from sprag_study.service.storage.people.people import Quota, UserRecord
 from sprag_study.service.storage.people.scopes import TokenScope, TokenState
 from tests.service.http.people import OWN, Office
@@ -291,3 +292,66 @@ def test_a_test_mail_and_a_test_webhook_are_sent(
         assert send("webhook", "https://elsewhere.example/x")[0] == 422
         assert len(box.mails) == 1
         assert len(hook.requests) == 1
+
+
+def test_a_quota_is_as_set_again(office: Office) -> None:
+    ada, people = office.program("ada"), office.store.people
+    with act_as(of_machine(Door.COMMAND)):
+        people.change_user("dora", quota=Quota(100, 2**20, 3))
+    page = ada.get("/me/users", params={"user": "dora"}).text
+    assert re.findall(r'<input type="checkbox" name="(\w+ as set)">', page) == [
+        "cases as set", "storage as set", "checks as set",
+    ]  # fmt: skip
+    form = user(
+        "dora", "change", cases="100", storage="1", checks="5", **{"cases as set": "on", "storage as set": "on"}
+    )
+    assert ada.post("/me/users", data=form, headers=OWN).status_code == 303
+    assert person(office, "dora").quota == Quota(None, None, 5)
+    (row,) = office.store.audit.page(AuditFilter(action="user.change", actor="ada")).records
+    assert row.detail == {"changes": {"most_cases": [100, None], "most_bytes": [2**20, None], "most_checks": [3, 5]}}
+    shown = ada.get("/me/audit", params={"action": "user.change", "actor": "ada"}).text
+    assert re.search(r'most cases: <span translate="no">100</span> → <span translate="no">as set</span>', shown)
+
+
+def test_a_user_has_a_limited_number_of_tokens(
+    settings: Settings, service: Service, connect: Callable[..., httpx.Client]
+) -> None:
+    office = Office(settings, service, connect, user_tokens=3)
+    dora, people = office.program("dora"), office.store.people
+    form = {"do": "create", "name": "x", "scope": "read"}
+    assert [dora.post("/me/tokens", data=form, headers=OWN).status_code for _ in range(3)] == [200, 200, 422]
+    refused = dora.post("/me/tokens", data=form, headers={**OWN, "Accept-Language": "uk"})
+    assert "Чинних токенів у користувача dora: 3" in refused.text
+    assert "dora has 3 valid tokens, the most at one time" in dora.post("/me/tokens", data=form, headers=OWN).text
+    # Renewing is possible, within bounds; one that is revoked makes room, and not without end.
+    for _ in range(3):
+        newest = next(token for token in people.tokens() if token.owner == "dora")
+        renewed = dora.post("/me/tokens", data={"do": "renew", "id": newest.id}, headers=OWN)
+        assert renewed.status_code == 200
+    newest = next(token for token in people.tokens() if token.owner == "dora")
+    assert dora.post("/me/tokens", data={"do": "renew", "id": newest.id}, headers=OWN).status_code == 422
+    made = 0
+    for _ in range(20):
+        for token in people.tokens():
+            if token.owner == "dora" and token.id != office.ids["dora"]:
+                people.revoke_token(token.id)
+        made += dora.post("/me/tokens", data=form, headers=OWN).status_code == 200
+    assert made == 4 * 3 - 6
+    assert office.program("ada").post("/me/users", data={"of": "token", **form}, headers=OWN).status_code == 200
+
+
+def test_revoking_is_asked_about_on_a_page_of_its_own(office: Office) -> None:
+    dora, ada = office.program("dora"), office.program("ada")
+    mine, hers = office.ids["dora"], office.ids["ada"]
+    assert f'<a href="/me/tokens?id={mine}">' in dora.get("/me").text
+    page = dora.get("/me/tokens", params={"id": mine}).text
+    assert "Revoke the token of dora?" in page
+    assert "revoking it logs you out" in page
+    assert '<form method="post" action="/me/tokens">\n<input type="hidden" name="of" value="token">' in page
+    assert dora.get("/me/tokens", params={"id": hers}).status_code == 404
+    of_other = ada.get("/me/tokens", params={"id": mine}).text
+    assert 'action="/me/users"' in of_other
+    assert "logs you out" not in of_other
+    assert office.program("vera").get("/me/tokens", params={"id": office.ids["vera"]}).status_code == 403
+    assert ada.post("/me/users", data={"of": "token", "do": "revoke", "id": mine}, headers=OWN).status_code == 303
+    assert ada.get("/me/tokens", params={"id": mine}).status_code == 404
