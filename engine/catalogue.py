@@ -65,6 +65,9 @@ class ResultInfo:
         Kind of its numbers; those of a category are indices into ``categories``.
     categories : tuple of str
         Names of a category's values. A name never changes its position, because the numbers are stored.
+    generation : int
+        0 for the results that rows had when they first got digests; those added later count on, and rows of before lack
+        them.
     """
 
     name: str
@@ -72,6 +75,7 @@ class ResultInfo:
     description: str
     kind: Kind = "real"
     categories: tuple[str, ...] = ()
+    generation: int = 0
 
     @property
     def column(self) -> str:

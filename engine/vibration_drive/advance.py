@@ -74,6 +74,11 @@ class _Advance:
         power = [code.let("P", product(total, self.shaft, k)) for k in range(layout.order + 1)]
         self.add(layout.sum_held, f"(1.0 - {rotating})*({self.over(total)})")
         self.add(layout.work_clutch, self.over(power))
+        if layout.drag:
+            squares = [code.let("R", square(self.shaft, k)) for k in range(layout.order + 1)]
+            cubes = [code.let("C", product(squares, self.shaft, k)) for k in range(layout.order + 1)]
+            self.add(layout.speed_square, self.over(squares))
+            self.add(layout.speed_cube, self.over(cubes))
         self.add(layout.time_held, f"(1.0 - {rotating})*{self.taken}")
         self.add(layout.time_rotating, f"{rotating}*{self.taken}")
         self.add(layout.time_driven, f"{code.row(layout.driven)}*{self.taken}")

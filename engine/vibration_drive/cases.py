@@ -1,14 +1,14 @@
 """Conversion of parameter columns to the matrix of cases that compiled code reads."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from enum import IntEnum, auto
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sprag_study.engine.run import Run
-from sprag_study.engine.vibration_drive.parameters import MAX_COEFFICIENTS, MAX_PENDULUMS, PARAMETERS
+from sprag_study.engine.vibration_drive.parameters import DRAG, MAX_COEFFICIENTS, MAX_PENDULUMS, PARAMETERS
 
 Floats = NDArray[np.float64]
 
@@ -23,6 +23,9 @@ class Column(IntEnum):
     CHI = auto()
     GRAVITY = auto()
     LOAD = auto()
+    BEARING = auto()
+    LINEAR = auto()
+    QUADRATIC = auto()
     INERTIA = auto()
     INVERSE_RATE = auto()
     SPEED = auto()
@@ -97,6 +100,18 @@ def coefficient_count(columns: Mapping[str, ArrayLike]) -> int:
     return max(MIN_COEFFICIENTS, *orders)
 
 
+def has_drag(paths: Iterable[str]) -> bool:
+    """Whether any of the parameters is a torque that depends on speeds."""
+    return any(path.rpartition(".")[2] in DRAG for path in paths)
+
+
+def unloaded(matrix: Floats) -> NDArray[np.bool_]:
+    """Whether nothing resists the shaft of each case of a matrix, so that every speed that no clutch changes lasts."""
+    resisting = [Column.LOAD, Column.BEARING, Column.LINEAR, Column.QUADRATIC]
+    free: NDArray[np.bool_] = np.all(matrix[:, resisting] == 0.0, axis=1)
+    return free
+
+
 def _stop(time: Floats) -> tuple[Floats, Floats]:
     """Split times in periods into whole periods and a fraction in (0, 1]; time 0 is (0, 0)."""
     nearest = np.rint(time)
@@ -119,10 +134,9 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
     Returns
     -------
     array, shape (cases, columns)
-        `Column`: nu, period, d nu^2, b nu^2, chi, g, M_c, J_e, 1/rate, initial speed, step budget; four stops; per
-        pendulum
-        `PendulumColumn`: M l/J, c a^2/J, lambda/J, 1/J, J, delta, u_end, initial angle, speed, windup and state of
-        the clutch; its clutch coefficients.
+        `Column`: nu, period, d nu^2, b nu^2, chi, g, M_c, lambda_e, k_1, k_2, J_e, 1/rate, initial speed, step budget;
+        four stops; per pendulum `PendulumColumn`: M l/J, c a^2/J, lambda/J, 1/J, J, delta, u_end, initial angle, speed,
+        windup and state of the clutch; its clutch coefficients.
     """
     n, count = pendulum_count(columns), coefficient_count(columns)
 
@@ -183,6 +197,8 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
     shaft = {
         C.NU: nu, C.PERIOD: 1.0 / frequency, C.ACC_X: acc_x, C.ACC_Y: acc_y,
         C.CHI: parameter("excitation.phase"), C.GRAVITY: gravity, C.LOAD: parameter("shaft.load"),
+        C.BEARING: parameter("shaft.bearing_damping"), C.LINEAR: parameter("shaft.linear_load"),
+        C.QUADRATIC: parameter("shaft.quadratic_load"),
         C.INERTIA: shaft_inertia, C.INVERSE_RATE: 1.0 / rate, C.SPEED: parameter("shaft.initial_speed"),
         C.MOST_STEPS: run.step_budget(cycles),
     }  # fmt: skip

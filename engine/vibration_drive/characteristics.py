@@ -38,6 +38,8 @@ class _Cases:
         self.lay, self.matrix, self.sums = lay, matrix, sums
         self.period, self.load = matrix[:, Column.PERIOD], matrix[:, Column.LOAD]
         self.inertia = matrix[:, Column.INERTIA]
+        self.bearing, self.linear = matrix[:, Column.BEARING], matrix[:, Column.LINEAR]
+        self.quadratic = matrix[:, Column.QUADRATIC]
         start, whole, end = (matrix[:, stop_column(k)] + matrix[:, stop_column(k) + 1] for k in range(3))
         self.periods = end - start
         self.whole_periods = end - whole
@@ -55,6 +57,11 @@ class _Cases:
         first = OUT_SUMS + _shaft_width(self.lay) + i * _pendulum_width(self.lay)
         column: Floats = self.sums[:, first + row - self.lay.p_sum_phi]
         return column
+
+    def work_against_load(self, turn: Floats, square: Floats, cube: Floats) -> Floats:
+        """Work in J against the load, from the integrals of the shaft's speed, its square and its cube."""
+        work: Floats = self.load * turn + self.linear * square + self.quadratic * cube
+        return work
 
     def parameter(self, i: int, column: PendulumColumn) -> Floats:
         values: Floats = self.matrix[:, pendulum_column(self.lay.coefficients, i, column)]
@@ -117,7 +124,7 @@ _LARGEST = (
     "p_torque_max", "p_u_max",
 )  # fmt: skip
 _LATEST = ("speed_2", "energy_2")
-_FIRST = ("speed_0", "energy_0", "turn_0", "turn_1", "input_1")
+_FIRST = ("speed_0", "energy_0", "turn_0", "turn_1", "input_1", "square_1", "cube_1")
 
 
 def combined(lay: Layout, parts: list[Floats]) -> Floats:
@@ -203,14 +210,22 @@ def _shaft(cases: _Cases, out: dict[str, Floats]) -> None:
     out["shaft.acceleration.max"] = cases.shaft("acc_max")
     out["torque.mean"] = _over_pendulums(cases, out, "torque.mean")
     out["torque.max"] = cases.shaft("sum_max") if cases.lay.n > 1 else cases.pendulum(0, "torque_max")
-    out["power.useful.mean"] = cases.load * mean
-    out["power.useful.max"] = cases.load * cases.shaft("speed_max")
+    square, cube, largest = cases.shaft("speed_square"), cases.shaft("speed_cube"), cases.shaft("speed_max")
+    out["power.bearing.mean"] = cases.bearing * square / cases.length
+    out["power.linear.mean"] = cases.linear * square / cases.length
+    out["power.quadratic.mean"] = cases.quadratic * cube / cases.length
+    out["power.useful.mean"] = cases.load * mean + (out["power.linear.mean"] + out["power.quadratic.mean"])
+    out["power.useful.max"] = cases.work_against_load(largest, np.square(largest), largest * np.square(largest))
     out["power.clutch.mean"] = cases.shaft("work_clutch") / cases.length
     out["power.clutch.max"] = cases.shaft("power_max")
     out["power.input.mean"] = _over_pendulums(cases, out, "power.input")
-    out["power.loss.mean"] = _over_pendulums(cases, out, "power.loss")
+    out["power.loss.mean"] = _over_pendulums(cases, out, "power.loss") + out["power.bearing.mean"]
     out["power.stored.mean"] = (cases.shaft("energy_2") - cases.shaft("energy_0")) / cases.length
-    useful = cases.load * (cases.shaft("turn_2") - cases.shaft("turn_1"))
+    useful = cases.work_against_load(
+        cases.shaft("turn_2") - cases.shaft("turn_1"),
+        square - cases.shaft("square_1"),
+        cube - cases.shaft("cube_1"),
+    )
     supplied = out["power.input.mean"] * cases.length - cases.shaft("input_1")
     out["efficiency"] = np.where(cases.whole_periods > 0.5, _ratio(useful, supplied), np.nan)
     out["fraction.rotating"] = cases.shaft("time_rotating") / cases.time
@@ -235,7 +250,8 @@ def _balances(cases: _Cases, out: dict[str, Floats]) -> None:
     supplied = out["power.input.mean"] * length
     stored = out["power.stored.mean"] * length
     lost = out["power.loss.mean"] * length
-    useful = cases.load * turn
+    square = cases.shaft("speed_square")
+    useful = cases.work_against_load(turn, square, cases.shaft("speed_cube"))
     kinetic = 0.5 * cases.inertia * np.square(cases.shaft("speed_max"))
     for i in range(cases.lay.n):
         fastest = np.maximum(cases.pendulum(i, "speed_max"), -cases.pendulum(i, "speed_min"))
@@ -249,7 +265,9 @@ def _balances(cases: _Cases, out: dict[str, Floats]) -> None:
     out["balance.energy"] = np.where(size > 0.0, _ratio(np.abs(residual), size), np.where(np.isnan(size), np.nan, 0.0))
 
     impulse = out["torque.mean"] * length
-    against = cases.load * cases.shaft("time_rotating")
+    against = (
+        cases.load * cases.shaft("time_rotating") + (cases.bearing + cases.linear) * turn + cases.quadratic * square
+    )
     gained = cases.inertia * (cases.shaft("speed_2") - cases.shaft("speed_0"))
     held = cases.shaft("sum_held")
     carried = cases.inertia * cases.shaft("speed_max")

@@ -5,7 +5,8 @@ speed and total clutch torque of the shaft, ``X, Y`` the base's accelerations x'
 by J:
 
     w' = (M l/J) (x'' cos phi + y'' sin phi + g sin phi) - (c a^2/J) phi - (lambda/J) w - T/J
-    shaft' = (sum T - M_c) / J_e                  T = sum c_k u^(k-1)                 u' = w - shaft
+    shaft' = (sum T - M_c - (lambda_e + k_1) shaft - k_2 shaft^2) / J_e
+    T = sum c_k u^(k-1)                 u' = w - shaft
 
 Modes enter as numbers, not branches: the law in force is zero where a clutch is free and a straight line beyond the
 data; the shaft's mobility is zero where it is held. A locked clutch has w' = shaft', and its torque follows from this.
@@ -24,7 +25,7 @@ from sprag_study.engine.taylor.straight import (
     smaller,
     square,
 )
-from sprag_study.engine.vibration_drive.formulas import base_series, drive, free_acceleration
+from sprag_study.engine.vibration_drive.formulas import base_series, drive, free_acceleration, resistance
 from sprag_study.engine.vibration_drive.layout import Layout
 
 #: Share of the estimated convergence-limited step that is taken (Jorba and Zou 2005 take e^-2, which is far too careful
@@ -140,6 +141,7 @@ def series_loop(layout: Layout) -> str:
     for p in pendulums:
         p.weight = code.let(f"weight{p.index}", p.ml * gravity)
     shaft = [code.load("W0", layout.speed)]
+    linear, quadratic = (code.load(name, getattr(layout, name)) for name in ("linear", "quadratic"))
     for k in range(order + 1):
         for p in pendulums:
             p.torque.append(_torque(code, p, k))
@@ -147,7 +149,10 @@ def series_loop(layout: Layout) -> str:
             for p in pendulums:
                 _free_acceleration(code, p, x, y, k)
             push = " + ".join(f"({p.torque[k]} + {p.locked}*{p.inertia}*{p.free})" for p in pendulums)
-            code.let(f"A{k}", f"mobility*({push}{' - load' if k == 0 else ''})")
+            against = " - load" if k == 0 else ""
+            if layout.drag:
+                against += f" - {resistance(linear, quadratic, shaft[k], code.let(f'WW{k}', square(shaft, k)))}"
+            code.let(f"A{k}", f"mobility*({push}{against})")
             shaft.append(code.let(f"W{k + 1}", f"A{k}*{1.0 / (k + 1)!r}"))
             for p in pendulums:
                 i = p.index

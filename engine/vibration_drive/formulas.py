@@ -55,6 +55,15 @@ def free_acceleration(
     return -damping * w - spring * phi + weight * sin + ml * driven
 
 
+def resistance(linear: _Value, quadratic: _Value, speed: _Value, square: _Value) -> _Value:
+    """Torque in N*m that resists the shaft by its speed (rad/s), beside the dry load; or a coefficient of its series.
+
+    ``linear`` and ``quadratic`` are lambda_e + k_1 and k_2, ``square`` is the same coefficient of the speed's square:
+    the shaft never turns back, so it is that of omega |omega| too.
+    """
+    return linear * speed + quadratic * square
+
+
 def beyond(end: _Value, rate: _Value, over: _Value) -> _Value:
     """Energy in J that a clutch stores beyond its data, where law (3) goes on straight.
 

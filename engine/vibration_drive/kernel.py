@@ -1,6 +1,6 @@
 """The generated kernel: straight-line code for one shape of machine, stored with its machine code in a per-user cache.
 
-One module per (pendulums, clutch coefficients, order, lanes).
+One module per (pendulums, clutch coefficients, whether torques depend on speeds, order, lanes).
 """
 
 import importlib.util
@@ -24,7 +24,7 @@ from sprag_study.engine.taylor.batch import ROWS, SLOTS, peaks_loop, roots_loop
 from sprag_study.engine.taylor.straight import same_everywhere
 from sprag_study.engine.vibration_drive.advance import advance_loop
 from sprag_study.engine.vibration_drive.bounds import bounds_loop
-from sprag_study.engine.vibration_drive.cases import coefficient_count, pendulum_count
+from sprag_study.engine.vibration_drive.cases import coefficient_count, has_drag, pendulum_count
 from sprag_study.engine.vibration_drive.equations import series_loop
 from sprag_study.engine.vibration_drive.layout import Layout, make_layout
 
@@ -203,12 +203,12 @@ def _write(path: Path, text: str) -> None:
 
 
 @cache
-def kernel(pendulums: int, coefficients: int, order: int, lanes: int) -> Kernel:
-    """The kernel of one shape, generated or loaded from the cache."""
-    name = f"drive_n{pendulums}_c{coefficients}_p{order}_l{lanes}"
+def kernel(pendulums: int, coefficients: int, order: int, lanes: int, *, drag: bool = False) -> Kernel:
+    """The kernel of one shape, generated or loaded from the cache; ``drag``: with torques that depend on speeds."""
+    name = f"drive_n{pendulums}_c{coefficients}_p{order}_l{lanes}{'_drag' if drag else ''}"
     path = cache_folder() / f"{name}.py"
     if not path.exists():
-        _write(path, source(make_layout(pendulums, coefficients, order, lanes)))
+        _write(path, source(make_layout(pendulums, coefficients, order, lanes, drag=drag)))
     spec = importlib.util.spec_from_file_location(f"sprag_kernels.{name}", path)
     assert spec is not None
     assert spec.loader is not None
@@ -226,4 +226,5 @@ def kernel_of(columns: Mapping[str, ArrayLike], tolerance: float) -> Kernel:
     ValueError
         If the number of pendulums or coefficients is out of range.
     """
-    return kernel(pendulum_count(columns), coefficient_count(columns), order_for(tolerance), lane_count())
+    shape = pendulum_count(columns), coefficient_count(columns), order_for(tolerance), lane_count()
+    return kernel(*shape, drag=True) if has_drag(columns) else kernel(*shape)

@@ -43,6 +43,7 @@ _RUNNING = -1
 
 _NU, _PERIOD, _ACC_X, _ACC_Y = int(Column.NU), int(Column.PERIOD), int(Column.ACC_X), int(Column.ACC_Y)
 _CHI, _GRAVITY, _LOAD, _INERTIA = int(Column.CHI), int(Column.GRAVITY), int(Column.LOAD), int(Column.INERTIA)
+_BEARING, _LINEAR, _QUADRATIC = int(Column.BEARING), int(Column.LINEAR), int(Column.QUADRATIC)
 _INVERSE_RATE, _SPEED, _MOST_STEPS = int(Column.INVERSE_RATE), int(Column.SPEED), int(Column.MOST_STEPS)
 _FIRST_PENDULUM = stop_column(STOPS)
 _P_COPIED = int(PendulumColumn.LIMIT) + 1
@@ -74,6 +75,8 @@ def load_case(
     W[lay.sin_chi, lane] = sine(row[_CHI])
     W[lay.gravity, lane] = row[_GRAVITY]
     W[lay.load, lane] = row[_LOAD]
+    W[lay.linear, lane] = row[_BEARING] + row[_LINEAR]
+    W[lay.quadratic, lane] = row[_QUADRATIC]
     W[lay.inertia, lane] = row[_INERTIA]
     W[lay.inverse_rate, lane] = row[_INVERSE_RATE]
     W[lay.most_steps, lane] = row[_MOST_STEPS]

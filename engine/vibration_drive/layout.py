@@ -45,6 +45,8 @@ class Layout(NamedTuple):
 
     n: int
     coefficients: int
+    # whether torques act that depend on speeds (`parameters.DRAG`): 0 or 1
+    drag: int
     order: int
     lanes: int
     rows: int
@@ -55,7 +57,7 @@ class Layout(NamedTuple):
     f_stop: int
     period: int
     # parameters; acc_x, acc_y are the amplitudes of the base's acceleration, inverse_rate scales accelerations to
-    # speeds
+    # speeds, linear and quadratic are the torques per speed and per square of it that resist the shaft
     nu: int
     acc_x: int
     acc_y: int
@@ -63,6 +65,8 @@ class Layout(NamedTuple):
     sin_chi: int
     gravity: int
     load: int
+    linear: int
+    quadratic: int
     inertia: int
     inverse_rate: int
     most_steps: int
@@ -85,11 +89,13 @@ class Layout(NamedTuple):
     steps: int
     # state (with speed[0])
     turn: int
-    # sums over the window
+    # sums over the window; speed_square and speed_cube are integrals of powers of the shaft's speed
     sum_held: int
     time_held: int
     time_rotating: int
     time_driven: int
+    speed_square: int
+    speed_cube: int
     work_clutch: int
     # extrema over the window
     speed_max: int
@@ -106,6 +112,8 @@ class Layout(NamedTuple):
     energy_0: int
     energy_2: int
     input_1: int
+    square_1: int
+    cube_1: int
     driving_max: int
     energy_lost: int
     # excess of this step over each known extremum
@@ -198,11 +206,11 @@ _beside(
     # As the columns of a case (`PendulumColumn`) are copied.
     "p_ml p_spring p_damping p_inverse_inertia p_inertia p_backlash p_limit",
     # Sums that begin at 0, those of the shaft and those of a pendulum.
-    "sum_held time_held time_rotating time_driven work_clutch",
+    "sum_held time_held time_rotating time_driven speed_square speed_cube work_clutch",
     "p_sum_phi p_sum_torque p_work_input p_work_loss p_time_engaged p_time_beyond p_engagements",
     # What is handed out at the end of a window, as far as characteristics reads it.
     "work_clutch speed_max speed_min acc_max sum_max power_max turn_0 turn_1 turn_2 speed_0 speed_2 energy_0 energy_2 "
-    "input_1 driving_max energy_lost",
+    "input_1 square_1 cube_1 driving_max energy_lost",
     "p_engagements p_phi_max p_phi_min p_speed_max p_speed_min p_acc_max p_acc_min p_torque_max p_u_max",
     # Guards in the order of `Band`, and what lies as far from its bounds or extrema as any other.
     f"p_{_BANDS.format('p_')}",
@@ -216,9 +224,9 @@ _beside(
 )
 
 
-def make_layout(n: int, coefficients: int, order: int, lanes: int) -> Layout:
-    """Lay out the rows for ``n`` pendulums, that many clutch coefficients, series of that order, and that many
-    lanes.
+def make_layout(n: int, coefficients: int, order: int, lanes: int, *, drag: bool = False) -> Layout:
+    """Lay out the rows for ``n`` pendulums, that many clutch coefficients, series of that order, and that many lanes;
+    ``drag``: for torques that depend on speeds too.
     """
     sizes = dict.fromkeys(("speed", "p_speed", "p_torque"), order + 1)
     sizes |= {"p_drive": order, "p_law": coefficients, "p_force": coefficients}
@@ -232,7 +240,7 @@ def make_layout(n: int, coefficients: int, order: int, lanes: int) -> Layout:
         else:
             fields[name] = shaft_rows
             shaft_rows += sizes.get(name, 1)
-    return Layout(n, coefficients, order, lanes, shaft_rows + n * stride, shaft_rows, stride, **fields)
+    return Layout(n, coefficients, int(drag), order, lanes, shaft_rows + n * stride, shaft_rows, stride, **fields)
 
 
 def as_record(layout: Layout) -> Layout:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sprag_study.engine.compile.jit import inlined, part
 from sprag_study.engine.elementary.angles import cosine, sine
 from sprag_study.engine.vibration_drive.automaton import Band
-from sprag_study.engine.vibration_drive.formulas import base_series, drive, free_acceleration
+from sprag_study.engine.vibration_drive.formulas import base_series, drive, free_acceleration, resistance
 from sprag_study.engine.vibration_drive.layout import Layout
 from sprag_study.engine.vibration_drive.states import (
     ENGAGED,
@@ -52,6 +52,7 @@ _T_LOW, _T_HIGH = int(Band.T_LOW), int(Band.T_HIGH)
 
 
 _base_series, _drive, _free_acceleration = inlined(base_series), inlined(drive), inlined(free_acceleration)
+_resistance = inlined(resistance)
 
 
 @part
@@ -221,6 +222,9 @@ def _shared_acceleration(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, siz
     a linear complementarity problem.
     """
     push = -W[lay.load, lane]
+    if lay.drag == 1:
+        speed = W[lay.speed, lane]
+        push -= _resistance(W[lay.linear, lane], W[lay.quadratic, lane], speed, speed * speed)
     for j in range(lay.n):
         base = lay.pendulums + j * lay.stride
         notes = base + lay.p_m_w_low
@@ -251,6 +255,8 @@ def _shared_jerk(W: Floats, Z: Ints, lay: Layout, lane: int, rate: float) -> Non
     A clutch at the edge of opening can only gain torque, one at the edge of winding up can only lose it.
     """
     push = 0.0
+    if lay.drag == 1:
+        push -= _resistance(W[lay.linear, lane], W[lay.quadratic, lane], rate, 2.0 * W[lay.speed, lane] * rate)
     for j in range(lay.n):
         base = lay.pendulums + j * lay.stride
         notes = base + lay.p_m_w_low

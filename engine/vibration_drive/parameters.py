@@ -14,8 +14,12 @@ MAX_COEFFICIENTS = 12
 
 _INF = math.inf
 
-#: Parameters that a study has only where they are given: studies from before they existed keep their cases.
+#: States of clutches among the initial values.
 START_STATES = frozenset({"initial_windup", "initial_clutch"})
+#: Torques that depend on speeds: a drive in which any of them is given needs a kernel that has them.
+DRAG = frozenset({"bearing_damping", "linear_load", "quadratic_load"})
+#: Parameters that a study has only where they are given: studies from before they existed keep their cases.
+ONLY_GIVEN = START_STATES | DRAG
 
 _PARAMETERS = (
     Parameter("gravity", "g", "m/s^2", 0.0, 1e3, False, STANDARD_GRAVITY, "gravitational acceleration"),
@@ -57,6 +61,29 @@ _PARAMETERS = (
     ),
     Parameter("shaft.inertia", "J_e", "kg*m^2", 0.0, 1e6, True, None, "reduced inertia of the driven side"),
     Parameter("shaft.load", "M_c", "N*m", 0.0, 1e9, False, 0.0, "load torque, which resists rotation only"),
+    Parameter(
+        "shaft.bearing_damping",
+        "lambda_e",
+        "N*m*s/rad",
+        0.0,
+        1e6,
+        False,
+        0.0,
+        "viscous damping of the shaft, as by its bearings",
+    ),
+    Parameter(
+        "shaft.linear_load", "k_1", "N*m*s/rad", 0.0, 1e6, False, 0.0, "load torque per speed, as of a generator"
+    ),
+    Parameter(
+        "shaft.quadratic_load",
+        "k_2",
+        "N*m*s^2/rad^2",
+        0.0,
+        1e6,
+        False,
+        0.0,
+        "load torque per square of the speed, as of a fan or a pump",
+    ),
     Parameter("shaft.initial_speed", "phi_e'(0)", "rad/s", 0.0, 1e6, False, 0.0, "shaft speed at t = 0"),
 )
 
@@ -72,6 +99,9 @@ _PLAUSIBLE: Mapping[str, tuple[float, Sentence]] = {
     "spring_arm": (1.0, IN_MM),
     "spring_rate": (1e8, IN_ANOTHER_UNIT),
     "damping": (100.0, IN_ANOTHER_UNIT),
+    "bearing_damping": (100.0, IN_ANOTHER_UNIT),
+    "linear_load": (1e3, IN_ANOTHER_UNIT),
+    "quadratic_load": (100.0, IN_ANOTHER_UNIT),
     "backlash": (0.1, IN_DEGREES),
     "initial_angle": (math.pi, IN_DEGREES),
     "initial_windup": (1.0, IN_DEGREES),

@@ -57,7 +57,8 @@ _SENTENCES = {
 _MEANS = frozenset(
     {
         "shaft.speed.mean", "torque.mean", "power.useful.mean", "power.clutch.mean", "power.input.mean",
-        "power.loss.mean", "power.stored.mean", "efficiency", "fraction.rotating", "fraction.held", "fraction.driven",
+        "power.loss.mean", "power.bearing.mean", "power.linear.mean", "power.quadratic.mean", "power.stored.mean",
+        "efficiency", "fraction.rotating", "fraction.held", "fraction.driven",
         "clutches.engagements_per_period", "angle.mean", "fraction.engaged", "fraction.beyond_data", "power.input",
         "power.loss",
     }
@@ -125,6 +126,7 @@ def settled_infos(pendulums: int) -> tuple[ResultInfo, ...]:
             f"{infos[place].name}.half_width",
             infos[place].unit,
             f"half width of the 95 % interval of {infos[place].name}",
+            generation=infos[place].generation,
         )
         for place in means(pendulums)
     ]

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sprag_study.engine.endings import ENDINGS, Ending
 from sprag_study.engine.run import MEANS_FROM_PERIODS, SettledRun
-from sprag_study.engine.vibration_drive.cases import Column, case_matrix, pendulum_count
+from sprag_study.engine.vibration_drive.cases import Column, case_matrix, pendulum_count, unloaded
 from sprag_study.engine.vibration_drive.irregular import BATCHES, Batches
 from sprag_study.engine.vibration_drive.kernel import Kernel, kernel_of
 from sprag_study.engine.vibration_drive.lanes import RUNUP_SHARE
@@ -140,9 +140,9 @@ def settle(
     search = Search(module, matrix, settings, given=starts)
     results = _Results(cases, n, search.starts.shape[1])
     if cases:
-        loaded = matrix[:, Column.LOAD] > 0.0
-        _settle(search, np.flatnonzero(loaded), results)
-        _unloaded(module, search, np.flatnonzero(~loaded), results)
+        free = unloaded(matrix)
+        _settle(search, np.flatnonzero(~free), results)
+        _unloaded(module, search, np.flatnonzero(free), results)
         results.values[results.endings != _OK] = np.nan
         results.regimes[results.endings != _OK] = Regime.NONE
         settled = np.flatnonzero(results.endings == _OK)

@@ -148,7 +148,7 @@ def sampled(values: Mapping[str, float], found: Integration, times: Floats) -> T
     if value["shaft.load"] > 0.0:
         # As for the minimum in ``characteristics``: only rounding errors can turn back a loaded shaft.
         out["shaft.speed"] = np.maximum(out["shaft.speed"], 0.0)
-    out["power.useful"] = value["shaft.load"] * out["shaft.speed"]
+    out["power.useful"] = _load_torque(value, out["shaft.speed"]) * out["shaft.speed"]
     out["power.clutch"] = out["torque"] * out["shaft.speed"]
     for i in range(n):
         block = samples[:, pendulum_samples(i)]
@@ -162,7 +162,8 @@ def sampled(values: Mapping[str, float], found: Integration, times: Floats) -> T
         out[f"pendulums.{i}.power.input"] = moment * block[:, PendulumSample.DRIVE] * speed
         out[f"pendulums.{i}.power.loss"] = damping * np.square(speed)
     out["power.input"] = sum((out[f"pendulums.{i}.power.input"] for i in range(n)), np.zeros(done))
-    out["power.loss"] = sum((out[f"pendulums.{i}.power.loss"] for i in range(n)), np.zeros(done))
+    bearing = value["shaft.bearing_damping"] * np.square(out["shaft.speed"])
+    out["power.loss"] = sum((out[f"pendulums.{i}.power.loss"] for i in range(n)), bearing)
     named = {"shaft": [SHAFT_NAMES[int(s)] for s in states[:, 0]]}
     for i in range(n):
         named[f"pendulums.{i}"] = [CLUTCH_NAMES[int(s)] for s in states[:, 1 + i]]
@@ -170,7 +171,13 @@ def sampled(values: Mapping[str, float], found: Integration, times: Floats) -> T
     return Trajectory(times_done, names, units, np.column_stack([out[name] for name in names]), named, ending)
 
 
-def warm_up(pendulums: int, coefficients: int, tolerance: float) -> None:
+def _load_torque(value: Mapping[str, float], speed: Floats) -> Floats:
+    """Torque of the load in N*m at speeds of a rotating shaft in rad/s."""
+    torque: Floats = value["shaft.load"] + (value["shaft.linear_load"] + value["shaft.quadratic_load"] * speed) * speed
+    return torque
+
+
+def warm_up(pendulums: int, coefficients: int, tolerance: float, drag: bool = False) -> None:
     """Generate and compile the kernel of a shape, and what settles motions, so that others load them from the cache."""
     from sprag_study.engine.vibration_drive.settle import settle
 
@@ -178,6 +185,7 @@ def warm_up(pendulums: int, coefficients: int, tolerance: float) -> None:
     for i in range(pendulums):
         columns |= {f"pendulums.{i}.inertia": 1.0, f"pendulums.{i}.mass": 0.0, f"pendulums.{i}.arm": 0.0}
     columns |= {f"clutch.coefficients.{k}": 1.0 for k in range(max(1, coefficients))}
+    columns |= {"shaft.bearing_damping": 1.0} if drag else {}
     # Nothing moves, which is periodic: this runs all steps of the search, down to the means.
     settle(columns, SettledRun(tolerance=tolerance), cases=1)
     simulate(columns, Run(tolerance=tolerance), cases=1)

@@ -72,6 +72,8 @@ def _pass_stop(W: Floats, Z: Ints, lay: Layout, lane: int, stop: int, sums: Floa
     elif stop == 1:
         W[lay.turn_1, lane] = W[lay.turn, lane]
         W[lay.input_1, lane] = _input_work(W, lay, lane)
+        W[lay.square_1, lane] = W[lay.speed_square, lane]
+        W[lay.cube_1, lane] = W[lay.speed_cube, lane]
     elif stop == 2:
         W[lay.turn_2, lane] = W[lay.turn, lane]
         W[lay.speed_2, lane] = W[lay.speed, lane]

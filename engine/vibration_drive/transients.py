@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from sprag_study.engine.endings import ENDINGS, Ending
 from sprag_study.engine.outcome import Batch
 from sprag_study.engine.run import Run, SettledRun
-from sprag_study.engine.vibration_drive.cases import STOPS, Column, case_matrix, pendulum_count, stop_column
+from sprag_study.engine.vibration_drive.cases import STOPS, Column, case_matrix, pendulum_count, stop_column, unloaded
 from sprag_study.engine.vibration_drive.characteristics import characteristics
 from sprag_study.engine.vibration_drive.integration import integrate
 from sprag_study.engine.vibration_drive.kernel import kernel_of
@@ -145,7 +145,7 @@ class _Settled:
             self.seen[active, 0] = turned / (over * search.matrix[active, Column.PERIOD])
         speeds = search.history[active, -ROUND:, SHAFT_SPEED]
         # Without a load nothing slows down the shaft: its speed is settled once no clutch changes it.
-        steady = (search.matrix[active, Column.LOAD] == 0.0) & np.all(speeds == speeds[:, :1], axis=1)
+        steady = unloaded(search.matrix[active]) & np.all(speeds == speeds[:, :1], axis=1)
         self.seen[active[steady], 0] = speeds[steady, 0]
         others: Ints = active[~steady]
         return others

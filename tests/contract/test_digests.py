@@ -310,6 +310,32 @@ def test_chunks_that_are_stored_together_have_the_digests_of_their_own_rows(stor
     assert len({*stored.values()}) == len(stored) == 5
 
 
+def test_rows_keep_their_digest_where_results_are_added() -> None:
+    draw = np.random.default_rng(3)
+    cases, endings, flags = np.arange(30), ["ok"] * 30, [""] * 30
+    values = draw.standard_normal((30, 3))
+    values[4, 1] = np.nan
+    before = digest_of(row_words(cases, endings, flags, values))
+    wide = np.full((30, 6), np.nan)
+    wide[:, [0, 2, 5]] = values
+    generations = (0, 2, 0, 1, 2, 0)
+
+    def digest(rows: np.ndarray, chosen: tuple[int, ...]) -> int:
+        return digest_of(row_words(cases, endings, flags, rows, generations=chosen))
+
+    assert digest(wide, generations) == before
+    wide[7, 3] = 0.5
+    once = digest(wide, generations)
+    assert once == digest(wide[:, [0, 2, 3, 5]], (0, 0, 1, 0)) != before
+    wide[:, 1] = draw.standard_normal(30)
+    whole = digest(wide, generations)
+    assert len({before, once, whole}) == 3
+    for number in (np.nan, 0.0, np.nextafter(wide[9, 1], 2.0)):
+        changed = wide.copy()
+        changed[9, 1] = number
+        assert digest(changed, generations) != whole
+
+
 def test_the_digest_of_rows_is_that_of_what_a_database_keeps_in_any_order() -> None:
     draw = np.random.default_rng(1)
     cases, values = np.arange(40), draw.standard_normal((40, 5))

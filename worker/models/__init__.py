@@ -33,6 +33,7 @@ from sprag_study.engine.vibration_drive.parameters import (
     CLUTCH_WINDUP_LIMIT,
     MAX_COEFFICIENTS,
     MAX_PENDULUMS,
+    ONLY_GIVEN,
     START_STATES,
 )
 from sprag_study.worker.models import machine_shaft, vibration_drive
@@ -94,6 +95,7 @@ __all__ = [
     "NOT_SETTLED",
     "NO_PARAMETERS",
     "OK",
+    "ONLY_GIVEN",
     "REGIME_SENTENCES",
     "SETTLED",
     "SHARE",

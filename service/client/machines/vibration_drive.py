@@ -43,6 +43,9 @@ class DriveShaft(TypedDict, total=False):
 
     inertia: Quantity
     load: Quantity
+    bearing_damping: Quantity
+    linear_load: Quantity
+    quadratic_load: Quantity
     initial_speed: Quantity
 
 
@@ -92,6 +95,9 @@ class Drive(Studies):
         "pendulums.*.clutch.accuracy",
         "shaft.inertia",
         "shaft.load",
+        "shaft.bearing_damping",
+        "shaft.linear_load",
+        "shaft.quadratic_load",
         "shaft.initial_speed",
         "clutch.windup_limit",
         "clutch.accuracy",

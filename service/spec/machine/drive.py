@@ -17,7 +17,7 @@ from sprag_study.service.spec.schema.quantity import required_of
 from sprag_study.worker.models import (
     MAX_COEFFICIENTS,
     MAX_PENDULUMS,
-    START_STATES,
+    ONLY_GIVEN,
     VIBRATION_DRIVE,
     Parameter,
     parameter_catalogue,
@@ -162,7 +162,7 @@ def _read_section(node: Node, section: Record, prefix: str, machine: Drive) -> N
         return
     for name, entry in parameters.items():
         number = node[name].number_or_default(entry)
-        if number is None or (name in START_STATES and name not in node):
+        if number is None or (name in ONLY_GIVEN and name not in node):
             continue
         if name == "initial_clutch" and not number.is_integer():
             node[name].refuse("invalid-choice", "is not the number of a state", allowed=entry.help)

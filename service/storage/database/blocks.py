@@ -29,12 +29,14 @@ TUPLE_ROWS: Final = 200
 class Target:
     """A table of rows and its columns: `KEY_COLUMNS`, then a column for each result.
 
-    ``whole[i]``: the result i is a count or a category and has a column of integers.
+    ``whole[i]``: the result i is a count or a category and has a column of integers. ``generations``: those of the
+    results (`ResultInfo`).
     """
 
     table: str
     columns: tuple[str, ...]
     whole: tuple[bool, ...]
+    generations: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,14 +64,15 @@ def target(model: str, variant: str) -> Target:
     """The results table of a variant."""
     infos = models.result_infos(model, variant)
     columns = (*KEY_COLUMNS, *(info.column for info in infos))
-    return Target(results_table(model, variant).name, columns, tuple(info.kind != "real" for info in infos))
+    whole, generations = (info.kind != "real" for info in infos), (info.generation for info in infos)
+    return Target(results_table(model, variant).name, columns, tuple(whole), tuple(generations))
 
 
 @lru_cache(maxsize=64)
 def further_target(model: str, variant: str) -> Target | None:
     """The table with further rows of a case; None where there is none."""
     table, own = further_table(model, variant), target(model, variant)
-    return None if table is None else Target(table.name, own.columns, own.whole)
+    return None if table is None else Target(table.name, own.columns, own.whole, own.generations)
 
 
 def block(study: int, cases: Ints, result: ChunkResult) -> Block:

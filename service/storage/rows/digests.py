@@ -342,6 +342,7 @@ def _stored_words(
     layout = np.dtype([*types, *((f"value{index}", np.float64) for index in range(len(infos)))])
     query = sa.select(c.case_number, c.ending, c.flags, *(as_number(c[info.column]) for info in infos))
     query = query.where(c.study == row.number, *which).order_by(c.case_number).limit(_PART)
+    generations = tuple(info.generation for info in infos)
     last, skip = -1, 0
     while True:
         part = records(connection, query.where(c.case_number >= last).offset(skip), layout)
@@ -350,8 +351,11 @@ def _stored_words(
         values = np.array([part[f"value{index}"] for index in range(len(infos))]).reshape(len(infos), -1).T
         yield (
             part["case"].copy(),
-            row_words(part["case"], part["ending"].tolist(), part["flags"].tolist(), as_kept(values), further=further),
-        )
+            row_words(
+                part["case"], part["ending"].tolist(), part["flags"].tolist(), as_kept(values),
+                generations=generations, further=further,
+            ),
+        )  # fmt: skip
         # Cases may have several further rows, which a part may divide.
         end = int(part["case"][-1])
         at_end = int((part["case"] == end).sum())

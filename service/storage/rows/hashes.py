@@ -38,6 +38,18 @@ def _factors(count: int) -> Words:
     return np.frombuffer(text, dtype="<u8").astype(np.uint64) | np.uint64(1)
 
 
+@lru_cache(maxsize=64)
+def _places(generations: tuple[int, ...]) -> tuple[Words, Ints]:
+    """The factors of a row's words with results of these generations, and which results are later than the first.
+
+    Results of each generation follow those before it, wherever they stand: factors of the earlier ones do not move.
+    """
+    order = np.argsort(np.array(generations, dtype=np.int64), kind="stable")
+    factors = _factors(len(generations) + 2).copy()
+    factors[2 + order] = _factors(len(generations) + 2)[2:]
+    return factors, np.flatnonzero(generations)
+
+
 @lru_cache(maxsize=4096)
 def _text_word(ending: str, flags: str) -> int:
     return int.from_bytes(hashlib.blake2b(f"{ending}\n{flags}".encode(), digest_size=8).digest(), "little")
@@ -79,15 +91,21 @@ def row_words(
     flags: Sequence[str],
     values: Floats,
     *,
+    generations: tuple[int, ...] = (),
     further: bool = False,
 ) -> Words:
     """A hash of each row, uint64 array of shape (rows,); ``values``, shape (rows, results), are as from `as_kept`.
 
-    ``further``: the rows are those beside the first ones of their cases.
+    ``generations``: those of the results (`ResultInfo`); without them all are of the first. A row that lacks a later
+    result has the hash that it had before there was that result. ``further``: the rows are those beside the first ones
+    of their cases.
     """
-    factors = _factors(values.shape[1] + 2)
+    factors, later = _places(generations or (0,) * values.shape[1])
     # Half the time of the product of a matrix and a vector, for which numpy has no fast code with integers.
     words: Words = np.einsum("ij,j->i", values.view(np.uint64), factors[2:])
+    if later.size:
+        missing = np.isnan(values[:, later]).astype(np.uint64)
+        words -= np.einsum("ij,j->i", missing, factors[2 + later] * np.uint64(_NAN))
     words += cases.astype(np.uint64) * factors[0]
     words += _text_words(endings, flags) * factors[1]
     if further:

@@ -454,7 +454,7 @@ class Work(Part):
             # Before they are inserted: in turn with it, nothing would be in the processor's cache.
             for some in merged(blocks.values()):
                 rows.append(some)
-                words.append(_words(some, further=further))
+                words.append(_words(some, place, further=further))
             for key, digest in zip(blocks, _digests(words, blocks.values()), strict=True):
                 digests[key] = signed(digests[key] + digest)
             self.session.insert_blocks(connection, place, rows)
@@ -533,8 +533,9 @@ def _needs_round(connection: sa.Connection, number: int, cases: int | None = Non
     return row.done == row.cases and cases in {None, row.cases}
 
 
-def _words(rows: Block, *, further: bool) -> Words:
-    return row_words(rows.cases, rows.endings, rows.flags, rows.values, further=further)
+def _words(rows: Block, place: Target, *, further: bool) -> Words:
+    generations = place.generations
+    return row_words(rows.cases, rows.endings, rows.flags, rows.values, generations=generations, further=further)
 
 
 def _digests(words: Sequence[Words], blocks: Iterable[Block]) -> list[int]:

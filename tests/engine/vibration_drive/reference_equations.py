@@ -65,6 +65,9 @@ class Machine:
         self.chi = get("excitation.phase")
         self.g = get("gravity", 9.80665)
         self.inertia, self.load = get("shaft.inertia"), get("shaft.load")
+        self.bearing, self.linear, self.quadratic = (
+            get(f"shaft.{name}") for name in ("bearing_damping", "linear_load", "quadratic_load")
+        )
         law = tuple(get(f"clutch.coefficients.{k}") for k in range(12))
         while len(law) > 1 and law[-1] == 0.0:
             law = law[:-1]
@@ -80,10 +83,11 @@ class Machine:
             )
             for i in range(self.n)
         ]
-        # Angles, speeds, windups; shaft's angle and speed; integrals: torque, input, loss, clutch work, angles.
+        # Angles, speeds, windups; shaft's angle and speed; integrals: torque, input, loss, clutch work, angles; square
+        # and cube of the shaft's speed.
         n = self.n
         self.shaft = 3 * n + 1
-        self.start = np.zeros(4 * n + 6)
+        self.start = np.zeros(4 * n + 8)
         self.start[:n] = [get(f"pendulums.{i}.initial_angle") for i in range(n)]
         self.start[n : 2 * n] = [get(f"pendulums.{i}.initial_speed") for i in range(n)]
         self.start[self.shaft] = get("shaft.initial_speed")
@@ -103,6 +107,10 @@ class Machine:
         drive = p.moment * (ax * np.cos(phi) + (ay + self.g) * np.sin(phi))
         return drive - p.spring * phi - p.damping * speed
 
+    def against(self, speed: Any) -> Any:
+        """Torque that resists the rotating shaft."""
+        return self.load + (self.bearing + self.linear) * speed + self.quadratic * speed * np.abs(speed)
+
     def torques(self, t: Any, y: Any) -> tuple[list[Any], Any]:
         """Torque of every clutch and the shaft's acceleration in the present mode."""
         sprung = [
@@ -114,7 +122,7 @@ class Machine:
         acceleration = 0.0 * t
         if self.shaft_state == "rotating":
             together = self.inertia + sum(self.pendulums[i].inertia for i in locked)
-            acceleration = (sum(sprung) + sum(free.values()) - self.load) / together
+            acceleration = (sum(sprung) + sum(free.values()) - self.against(y[self.shaft])) / together
         for i in locked:
             sprung[i] = free[i] - self.pendulums[i].inertia * acceleration
         return sprung, acceleration
@@ -140,5 +148,7 @@ class Machine:
         out[3 * n] = shaft
         out[self.shaft] = acceleration
         out[3 * n + 2] = sum(torque)
+        out[3 * n + 4] += self.bearing * shaft**2
         out[3 * n + 5] = sum(torque) * shaft
+        out[4 * n + 6], out[4 * n + 7] = shaft**2, shaft**3
         return out

@@ -59,6 +59,12 @@ class Drive(Automaton):
         self.window_engagements = self.out.engagements
         names = ("shaft.speed.mean", "", "torque.mean", "power.input.mean", "power.loss.mean", "power.clutch.mean")
         self.out.mean = {name: float(mean[3 * n + k]) for k, name in enumerate(names) if name}
+        square, cube = mean[4 * n + 6 : 4 * n + 8]
+        self.out.mean["power.bearing.mean"] = self.bearing * square
+        self.out.mean["power.linear.mean"] = self.linear * square
+        self.out.mean["power.quadratic.mean"] = self.quadratic * cube
+        useful = self.load * mean[3 * n] + self.linear * square + self.quadratic * cube
+        self.out.mean["power.useful.mean"] = float(useful)
         self.out.mean |= {f"pendulums.{i}.angle.mean": float(mean[3 * n + 6 + i]) for i in range(n)}
 
     def advance(self, t: float, end: float, y: Floats) -> Floats:

@@ -145,3 +145,21 @@ def test_a_kernel_counts_as_compiled_once_it_was_loaded(monkeypatch: pytest.Monk
     assert models.estimate_compile_seconds(study) == 0.0
     assert not models.is_compiled(replace(shape, key=(*shape.key[:-1], 1e-8)))
     assert not models.is_compiled(replace(shape, key=(1, 3, 1e-9)))
+
+
+def test_torques_that_depend_on_speeds_need_another_kernel() -> None:
+    study = fakes.study(3)
+    given = replace(study, base=study.base | {"shaft.bearing_damping": 2e-3, "shaft.quadratic_load": 1e-4})
+    shape = models.shape_of(given)
+    assert shape == models.KernelShape("vibration-drive", (1, 4, 1e-9, "drag"))
+    assert models.variant_of(given) == models.variant_of(study)
+    on_axis = replace(study, axes=(*study.axes, Axis(("shaft.linear_load",), (0.0, 1e-3, 2e-3))))
+    assert models.shape_of(on_axis) == shape
+    infos = [info.name for info in models.study_results(given)]
+    column = infos.index("power.quadratic.mean")
+    assert not models.run_chunk(study, 0, 3).values[:, column].any()
+    found = models.run_chunk(given, 0, 3)
+    assert found.endings == ["ok"] * 3
+    assert (found.values[:, column] > 0.0).all()
+    known = models.model_of("vibration-drive").known_answers
+    assert known(shape) != known(models.shape_of(study))

@@ -12,6 +12,7 @@ import numpy as np
 
 from sprag_study.engine import Ending, Run, Span
 from sprag_study.engine.catalogue import ResultInfo
+from sprag_study.engine.vibration_drive.cases import has_drag
 from sprag_study.engine.vibration_drive.clutch import ClutchLawError, check_law
 from sprag_study.engine.vibration_drive.parameters import (
     CLUTCH_COEFFICIENT,
@@ -104,16 +105,28 @@ _PENDULUM_OF_IT: Final = {
     "backlash": 0.005,
 }  # fmt: skip
 
+_DRAG_OF_IT: Final = {"shaft.bearing_damping": 1e-3, "shaft.quadratic_load": 1e-5}
+
 _PENDULUM = re.compile(r"pendulums\.(\d+)\.")
 _COEFFICIENT = re.compile(r"(?:^|\.)clutch\.coefficients\.(\d+)$")
 
 
+#: Last part of the key of a kernel with torques that depend on speeds.
+_DRAG: Final = "drag"
+
+
 class DriveKey(NamedTuple):
-    """Key of the kernel of a vibration drive."""
+    """Key of the kernel of a vibration drive; ``drag``: with torques that depend on speeds."""
 
     pendulums: int
     coefficients: int
     tolerance: float
+    drag: bool = False
+
+    @property
+    def shape(self) -> KernelShape:
+        """The shape with this key."""
+        return KernelShape(MODEL, (*self[:3], _DRAG) if self.drag else tuple(self[:3]))
 
 
 def _paths(study: Study) -> Iterable[str]:
@@ -237,7 +250,8 @@ class VibrationDrive(Model):
         return tuple(replace(info, name=info.name.replace(one, "pendulums.N.")) for info in started_infos(1))
 
     def shape_of(self, study: Study) -> KernelShape:
-        return KernelShape(MODEL, DriveKey(pendulums(study), coefficients(study), run_of(study.run).tolerance))
+        drag = has_drag(_paths(study))
+        return DriveKey(pendulums(study), coefficients(study), run_of(study.run).tolerance, drag).shape
 
     def sweeps(self, run: Mapping[str, Any]) -> bool:
         return is_settled(run) and not has_starts(run)
@@ -302,7 +316,8 @@ class VibrationDrive(Model):
         from sprag_study.engine.vibration_drive.simulate import estimate_seconds
 
         period = float(np.mean(1.0 / _frequencies(study)))
-        return estimate_seconds(*_key_of(self.shape_of(study)), _mean_periods(study), period)
+        key = _key_of(self.shape_of(study))
+        return estimate_seconds(key.pendulums, key.coefficients, key.tolerance, _mean_periods(study), period)
 
     def estimate_compile_seconds(self, shape: KernelShape) -> float:
         """On one core: 7 s for the kernel of one pendulum, 13 s for eight; 3.7 s for the search of settled motions."""
@@ -319,8 +334,8 @@ class VibrationDrive(Model):
     def known_answers(self, shape: KernelShape) -> bytes:
         from sprag_study.engine.vibration_drive.simulate import simulate
 
-        pendulums, coefficients, tolerance = _key_of(shape)
-        columns = dict(_DRIVEN)
+        pendulums, coefficients, tolerance, drag = _key_of(shape)
+        columns = _DRIVEN | (_DRAG_OF_IT if drag else {})
         for number in range(pendulums):
             columns |= {f"pendulums.{number}.{name}": value for name, value in _PENDULUM_OF_IT.items()}
         columns |= {f"clutch.coefficients.{k}": 200.0 for k in range(max(1, coefficients))}
@@ -405,4 +420,4 @@ def _is_law(law: NDArray[np.float64]) -> bool:
 
 
 def _key_of(shape: KernelShape) -> DriveKey:
-    return DriveKey(*cast("tuple[int, int, float]", shape.key))
+    return DriveKey(*cast("tuple[int, int, float]", shape.key[:3]), drag=shape.key[3:] == (_DRAG,))

@@ -8,8 +8,9 @@ from typing import Any
 
 import pytest
 
+from sprag_study.engine.vibration_drive.parameters import DRAG
 from sprag_study.worker.limits import MAX_CLUTCH_ROWS
-from sprag_study.worker.models import MAX_COEFFICIENTS, MAX_PENDULUMS, parameter_catalogue
+from sprag_study.worker.models import MAX_COEFFICIENTS, MAX_PENDULUMS, ONLY_GIVEN, parameter_catalogue, shape_of
 from tests.service.spec_sample import SPEC, parsed, problems
 
 PENDULUM = SPEC["base"]["pendulums"][0]
@@ -39,7 +40,11 @@ def test_every_parameter_keeps_its_range(entry: Any) -> None:
 
 @pytest.mark.parametrize(
     "entry",
-    [e for e in parameter_catalogue("vibration-drive") if not re.search("clutch|windup", e.path)],
+    [
+        entry
+        for entry in parameter_catalogue("vibration-drive")
+        if not re.search("clutch|windup", entry.path) and entry.path.rpartition(".")[2] not in ONLY_GIVEN
+    ],
     ids=lambda entry: entry.path,
 )
 def test_a_parameter_is_required_or_has_its_default(entry: Any) -> None:
@@ -197,3 +202,28 @@ def test_angles_that_include_the_backlash() -> None:
     assert limits["pendulums.1.clutch.windup_limit"] == pytest.approx(0.0501)
     unread = problems({"/base/clutch": clutch, "/base/pendulums/0/backlash": "much"})
     assert list(unread) == ["/base/pendulums/0/backlash"]
+
+
+@pytest.mark.parametrize("name", sorted(DRAG))
+def test_a_torque_that_depends_on_speeds_is_part_of_a_study_only_where_it_is_given(name: str) -> None:
+    assert not any(path.endswith(name) for path in parsed({}).study.base)
+    pointers = [
+        "/base/" + entry.path.replace(".N.", ".0.").replace(".", "/")
+        for entry in parameter_catalogue("vibration-drive")
+        if entry.path.endswith(name)
+    ]
+    for pointer in pointers:
+        path = pointer.removeprefix("/base/").replace("/", ".")
+        assert parsed({pointer: 2e-3}).study.base.items() - parsed({}).study.base.items() == {(path, 2e-3)}
+        on_axis = parsed({"/axes/2": {"path": path, "values": [0, 1e-3]}}).study
+        assert path not in on_axis.base
+        assert shape_of(on_axis) == shape_of(parsed({pointer: 2e-3}).study) != shape_of(parsed({}).study)
+
+
+def test_units_of_a_load_that_rises_with_the_speed() -> None:
+    base = parsed({
+        "/base/shaft/bearing_damping": "2 N*mm*s/rad", "/base/shaft/linear_load": "3 N*m*s",
+        "/base/shaft/quadratic_load": "1 N*cm*s^2/rad^2",
+    }).study.base  # fmt: skip
+    values = [base[f"shaft.{name}"] for name in ("bearing_damping", "linear_load", "quadratic_load")]
+    assert values == pytest.approx([2e-3, 3.0, 1e-2])
