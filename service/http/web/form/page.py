@@ -263,12 +263,14 @@ async def check(context: Ctx, work: Attended, request: Request, values: Form) ->
     checked = await look_over(context, work, values)
 
     def answer() -> dict[str, Any]:
+        sheet = None if "/text" in values else _sheet(request, values, checked, _choices(values))
         return {
             "faults": checked.faults,
             "beside": checked.beside,
             "run": checked.run,
             "panel": fragment("_form_panel.html", checked=checked, address=_address(request)),
-            "pictures": [] if "/text" in values else _sheet(request, values, checked, _choices(values)).pictures,
+            "pictures": [] if sheet is None else sheet.pictures,
+            "spans": {} if sheet is None else sheet.spans,
             "fits": {
                 pointer: fragment("_form_fit.html", fit=fit, chart=chart, pointer="")
                 for pointer, (fit, chart) in checked.fits.items()
@@ -377,7 +379,7 @@ def _sheet(request: Request, values: Values, checked: Checked, choices: Groups, 
             before = None
     return sheet_of(
         values,
-        checked.sketch or rough_drawings(model, _numbers(values)),
+        checked.sketch or rough_drawings(model, _to_draw(values)),
         choices,
         current().choice.units,
         tolerant=with_batch(values),
@@ -391,6 +393,13 @@ def _sheet(request: Request, values: Values, checked: Checked, choices: Groups, 
 def _numbers(values: Values) -> dict[str, float]:
     """The numbers of a form (SI, by path) that can be read."""
     return {base_path(name): value for name, value in _read_numbers(values).items()}
+
+
+def _to_draw(values: Values) -> dict[str, float]:
+    """The numbers of a form (SI, by path), in the place of required ones that cannot be read those of the example."""
+    known, begun = _numbers(values), _numbers(_begun(model_name(values)))
+    paths = {base_path(entry.name): entry.field.required for entry in entries(values) if entry.tolerant}
+    return {path: known.get(path, begun.get(path, 0.0) if required else 0.0) for path, required in paths.items()}
 
 
 def _read_numbers(values: Values) -> dict[str, float]:

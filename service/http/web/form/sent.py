@@ -15,9 +15,9 @@ from sprag_study.service.http.web.form.parts import count_of, drop, reshape, wit
 from sprag_study.service.http.web.form.spec import PARTS, is_search
 from sprag_study.service.http.web.form.tolerances import BATCH, own_name
 from sprag_study.service.reading.quantities import is_si
-from sprag_study.service.reading.together import with_last_unit
+from sprag_study.service.reading.together import split_list, with_last_unit
 from sprag_study.service.reading.units import QuantityError, split_quantity
-from sprag_study.service.spec.fields import base_pointer
+from sprag_study.service.spec.fields import base_path, base_pointer
 from sprag_study.worker import models
 from sprag_study.worker.models.form import FormChoice, Rows
 
@@ -66,6 +66,19 @@ def settle(values: Values, *, with_ticks: bool = True) -> None:
         for path in paths:
             if path not in changed:
                 _vary(values, part, path, wanted=path in varying)
+    if with_ticks:
+        _begin(values)
+
+
+def _begin(values: Values) -> None:
+    """Give a number that varies, and has no value of its own, the first one that it takes: the machine needs one."""
+    rows = varied(values)
+    for entry in entries(values):
+        row = rows.get(base_path(entry.name)) if entry.field.required else None
+        if row is not None and not values.get(entry.name, "").strip():
+            pointer = f"{PARTS[part_of(values)].pointer}/{row}"
+            name = "values" if values.get(f"{pointer}/way") == "values" else "from"
+            values[entry.name] = with_last_unit(split_list(values.get(f"{pointer}/{name}", "")) or [""])[0]
 
 
 def _part_tolerances(values: Values) -> None:

@@ -179,6 +179,11 @@ class Sheet:
         """The drawings in the order of the page."""
         return [plan.picture for block in (None, *self.blocks) for plan in self.drawn(block)]
 
+    @property
+    def spans(self) -> dict[str, str]:
+        """The values of what varies in words, by the name of its field."""
+        return {name: spot.span for name, spot in self.spots.items() if spot.row is not None}
+
     def shown(self, block: Block, *, front: bool) -> tuple[Entry, ...]:
         """The fields of a block in sight, or in the drawer."""
         return tuple(entry for entry in block.entries if
@@ -367,10 +372,10 @@ class _Making:
         )  # fmt: skip
 
     def _span(self, row: int) -> str:
-        """The values of a row in words: ``0 … 1.6 N*m``."""
+        """The values of a row in words: ``0 … 1.6 N·m``."""
         own = self._row(row)
         way = self.values.get(f"{own.pointer}/way", "")
-        unit = f" {own.quantity.unit}" if own.quantity.unit else ""
+        unit = f" {unit_text(own.quantity.unit)}" if own.quantity.unit else ""
         if way == "values":
             texts = [item for item in re.split(r"\s*;\s*", own.text("values")) if item]
             span = f"{texts[0]} … {texts[-1]}" if len(texts) > 1 else "".join(texts)

@@ -78,6 +78,7 @@ const check = async () => {
   const pictures = form.querySelectorAll(".picture");
   if (pictures.length === (found.pictures || []).length) pictures.forEach((place, index) => { place.innerHTML = found.pictures[index]; });
   else if (!pictures.length && !redrawn) { redrawn = true; reshape([]); } // a page that was made before the service could draw
+  for (const range of form.querySelectorAll("a.range")) range.textContent = (found.spans || {})[range.id] || range.textContent;
   const go = document.getElementById("go");
   if (go && found.run) go.textContent = found.run;
   const open = [...panel.querySelectorAll("details")].map((part) => part.open);
@@ -168,7 +169,7 @@ const explain = (event) => {
   const line = document.getElementById("explain"), { help, more } = event.target.dataset;
   if (!line || !(help || more)) return;
   const [text, link] = line.children;
-  text.textContent = help || event.target.labels?.[0]?.textContent || "";
+  text.textContent = help || event.target.labels?.[0]?.textContent || event.target.getAttribute("aria-label") || "";
   link.hidden = !more;
   if (more) { link.href = more; link.setAttribute("aria-label", sprag.say("Explanation: {label}", { label: event.target.labels?.[0]?.textContent.trim() || "" })); }
 };

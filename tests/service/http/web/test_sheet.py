@@ -161,6 +161,7 @@ def test_a_drive_of_ones_own_with_three_axes(visitor: Visitor, office: Office) -
     named(page, "/axes/2/count").fill("3")
     actions += 3
     expect(page.locator("#go")).to_contain_text("Run 81 cases")
+    assert stops(page) <= 20 + 3 * 3, "each axis has two ends and a number of values"
     assert page.evaluate(WORDS) <= 300
     page.locator("#go").click()
     actions += 1
@@ -169,6 +170,48 @@ def test_a_drive_of_ones_own_with_three_axes(visitor: Visitor, office: Office) -
     spec = office.get(f"/studies/{page.url.rpartition('/')[2]}")["spec"]
     assert [axis["path"] for axis in spec["axes"]] == ["shaft.load", "excitation.amplitude_x", "pendulums.0.arm"]
     assert spec["base"]["pendulums"][0]["mass"] == 0.4
+
+
+def test_a_number_that_varies_needs_no_other_value() -> None:
+    values = {name: text for name, text in DRIVE.items() if not name.endswith(("/frequency", "/pendulums/0/arm"))} | {
+        "/base/excitation/frequency": "", "/base/pendulums/0/arm": "", "axes": "2",
+        "vary:excitation.frequency": "on", "vary:pendulums.0.arm": "on",
+        "ticks:axes": "excitation.frequency pendulums.0.arm",
+        "/axes/0/path": "excitation.frequency", "/axes/0/way": "linspace", "/axes/0/from": "20", "/axes/0/to": "35",
+        "/axes/0/count": "4", "unit:/axes/0": "Hz",
+        "/axes/1/path": "pendulums.0.arm", "/axes/1/way": "values", "/axes/1/values": "30; 40", "unit:/axes/1": "mm",
+    }  # fmt: skip
+    settle(values)
+    base = spec_of(values)[0]["base"]
+    assert base["excitation"]["frequency"] in (20.0, "20 Hz")
+    assert base["pendulums"][0]["arm"] == "30 mm"
+
+
+def test_what_varies_stands_beside_its_number_as_it_is_typed(visitor: Visitor) -> None:
+    """From an empty form, by the keyboard: a tick opens the row, which the number repeats and leads to."""
+    page = visitor.page
+    page.goto("/new?begin=empty")
+    expect(page.locator("figure.plan.beside .dim")).to_have_count(11)
+    tick = page.locator('[name="vary:excitation.frequency"]')
+    tick.focus()
+    page.keyboard.press("Space")
+    first = named(page, "/axes/0/from")
+    expect(first).to_be_visible()
+    page.locator("a.range").focus()
+    page.keyboard.press("Enter")
+    expect(first).to_be_focused()
+    page.keyboard.type("20")
+    page.keyboard.press("Tab")
+    page.keyboard.type("35")
+    page.keyboard.press("Tab")
+    expect(named(page, "/axes/0/count")).to_be_focused()
+    expect(page.locator("a.range")).to_have_text("20 … 35 Hz")
+    expect(page.locator(".dim.varies .wrong:not(:empty)")).to_have_count(0)
+    row, machine = page.locator(".varies .axis").bounding_box(), page.locator(".machine").bounding_box()
+    assert row is not None
+    assert machine is not None
+    assert row["x"] > machine["x"] + machine["width"], "beside the machine, where the tick is seen"
+    assert row["y"] < 300
 
 
 def test_the_machine_moves_while_it_is_drawn(visitor: Visitor) -> None:
