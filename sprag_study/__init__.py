@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from sprag_study import engine
     from sprag_study.frames import simulate
     from sprag_study.local import run
+    from sprag_study.searches import Search, search
     from sprag_study.service.client import (
         AsyncClient,
         AsyncStudy,
@@ -78,6 +79,7 @@ __all__ = [
     "ExecutorError",
     "MissingExtraError",
     "RefusedError",
+    "Search",
     "ServiceError",
     "Shaft",
     "SpecError",
@@ -93,6 +95,7 @@ __all__ = [
     "engine",
     "preset",
     "run",
+    "search",
     "simulate",
     "sql",
     "with_units",
@@ -124,6 +127,8 @@ def __getattr__(name: str) -> Any:
     with extras.naming_extra(f"sprag.{name}"):
         if name == "run":
             return import_module("sprag_study.local").run
+        if name in ("Search", "search"):
+            return getattr(import_module("sprag_study.searches"), name)
         if name == "simulate":
             return import_module("sprag_study.frames").simulate
     raise AttributeError(f"module 'sprag_study' has no attribute {name!r}")

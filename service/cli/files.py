@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
 #: Largest file of measured data: far more rows than any clutch test has.
 MAX_DATA_BYTES = 16 * 1024 * 1024
-#: Fields of a spec that describe what varies.
-DESIGN_FIELDS = ("axes", "combine", "exclude")
 #: Errors of the storage rather than of the given name.
 _STORAGE_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS}
 
@@ -98,6 +96,7 @@ def read_spec(
     The cases of the CSV file ``points``, if given, replace the spec's axes; it may have ``limit`` bytes. The
     CSV files of ``files`` (``PLACE=FILE``) are tables of the machine. Raises WrongInputError with every problem found.
     """
+    from sprag_study.service.client.queries import with_points
     from sprag_study.service.spec.text import load_spec
 
     tables = named(files or ())
@@ -113,8 +112,7 @@ def read_spec(
         spec = with_tables(spec, [(place, decode(name, read_bytes(name, limit))) for place, name in tables])
     if points is None or not isinstance(spec, Mapping):
         return spec
-    rest = {name: part for name, part in spec.items() if name not in DESIGN_FIELDS}
-    return {**rest, "axes": [{"points": decode(points, read_bytes(points, limit))}]}
+    return with_points(spec, decode(points, read_bytes(points, limit)))
 
 
 def read_study(

@@ -11,7 +11,7 @@ from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Self, SupportsFloat, TypeAlias
 
 from sprag_study.service.client.errors import ArgumentError
-from sprag_study.service.client.queries import spec_of
+from sprag_study.service.client.queries import spec_of, without_cases
 from sprag_study.service.client.varied import paths_of, without
 
 if TYPE_CHECKING:
@@ -64,6 +64,10 @@ class Draft(Mapping[str, Any]):
 
     def _with(self, **fields: Any) -> Self:
         return self._begun({**self._spec, **known(**fields)})
+
+    def _choosing(self, **kind: Any) -> Self:
+        """A study that chooses its own cases, in place of those that it had."""
+        return self._begun({**without_cases(self._spec), **kind})
 
     def __getitem__(self, field: str) -> Any:
         return self._spec[field]
@@ -174,7 +178,15 @@ def _result(name: str, wanted: Any) -> dict[str, Any]:
 
 def _condition(text: str) -> dict[str, Any]:
     parts = _CONDITION.fullmatch(text.strip())
-    return {"result": text} if parts is None else {"result": parts[1], _RELATIONS[parts[2]]: parts[3]}
+    return {"result": text} if parts is None else {"result": parts[1], _RELATIONS[parts[2]]: _number(parts[3])}
+
+
+def _number(text: str) -> float | str:
+    """A number in SI; what has a unit, or is a name, stays a text."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
 
 
 def _expanded(base: Any, pattern: Sequence[str], before: str = "") -> Iterator[str]:

@@ -21,8 +21,8 @@ Ends = tuple[Value, Value]
 #: Paths of axes and their values.
 Held = Mapping[str, Value | Sequence[Value]]
 Spec = Mapping[str, Any]
-#: Fields of a spec that say which cases it has.
-DESIGN_FIELDS: Final = ("axes", "combine", "exclude")
+#: Fields of a spec that say which cases it has, or how it chooses them.
+CASE_FIELDS: Final = frozenset({"axes", "combine", "exclude", "refine", "goal", "calibrate"})
 
 
 def spec_of(spec: Spec | str | PathLike[str], cases: object = None) -> Spec:
@@ -33,9 +33,18 @@ def spec_of(spec: Spec | str | PathLike[str], cases: object = None) -> Spec:
     given = dict(spec) if isinstance(spec, Mapping) else _named_spec(spec)
     axes = given.get("axes")
     if cases is not None:
-        kept = {name: part for name, part in given.items() if name not in DESIGN_FIELDS}
-        return {**kept, "axes": [{"points": points_of(cases, "cases")}]}
+        return with_points(given, points_of(cases, "cases"))
     return {**given, "axes": [{"points": points_of(axes, "axes")}]} if hasattr(axes, "columns") else given
+
+
+def with_points(spec: Spec, points: str) -> Spec:
+    """A spec with the cases of a table, the text of a CSV file, in place of those that it has or chooses."""
+    return {**without_cases(spec), "axes": [{"points": points}]}
+
+
+def without_cases(spec: Spec) -> dict[str, Any]:
+    """A spec without what says which cases it has, or how it chooses them."""
+    return {name: part for name, part in spec.items() if name not in CASE_FIELDS}
 
 
 def _named_spec(spec: str | PathLike[str]) -> dict[str, Any]:

@@ -7,6 +7,7 @@ Its parts are the modules beside it (`text`, `units`, `run`, `warnings`, the `re
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final
@@ -87,15 +88,17 @@ def format_of(name: str) -> Format:
     return "toml" if PurePath(name).suffix.lower() == ".toml" else "json"
 
 
-def parse_spec(data: object) -> ParsedSpec:
+def parse_spec(data: object, told: Sequence[str] = ()) -> ParsedSpec:
     """The study that ``data`` (plain JSON data, as from `load_spec`) describes.
+
+    Goals may name what is ``told``, too: numbers without a unit that are no results of the model.
 
     Raises
     ------
     SpecError
         With all faults, each with its JSON Pointer, the value, and what is allowed.
     """
-    report = Report(data)
+    report = Report(data, told)
     spec = Node(report, "", data)
     if not SPEC.read(spec):
         raise report.error()

@@ -26,8 +26,10 @@ class SpecError(FaultError):
 class Report:
     """Collects faults and warnings while ``source``, plain data that the user wrote, is read."""
 
-    def __init__(self, source: object = None) -> None:
+    def __init__(self, source: object = None, told: Sequence[str] = ()) -> None:
         self._source = source
+        #: Names that goals may have beside the results of the study: numbers that somebody else computes.
+        self.told = told
         self.faults: list[Fault] = []
         #: Number of faults, including those beyond the limit.
         self.found = 0

@@ -48,7 +48,7 @@ def python(*arguments: str, cwd: Path = ROOT) -> subprocess.CompletedProcess[str
     return subprocess.run([sys.executable, *arguments], cwd=cwd, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.parametrize("title", ["Studies run here", "A spec in Python", "SQL", "The engine"])
+@pytest.mark.parametrize("title", ["Studies run here", "A spec in Python", "Goals of one's own", "SQL", "The engine"])
 def test_the_page_runs(title: str, tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text(section(title), encoding="utf-8")

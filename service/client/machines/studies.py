@@ -84,7 +84,7 @@ class Studies(Draft):
         polish : bool, optional
             Whether equalities are met exactly at the end.
         """
-        return self._with(
+        return self._choosing(
             goal=known(
                 vary=self._entries(vary, "values"),
                 best=results_of(best),
@@ -121,7 +121,7 @@ class Studies(Draft):
         seed : int, optional
             Seed of the random numbers.
         """
-        return self._with(
+        return self._choosing(
             calibrate=known(
                 unknown=self._entries(unknown, "values"), measured=measured, loss=loss, refits=refits, seed=seed
             )

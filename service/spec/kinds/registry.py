@@ -50,7 +50,10 @@ def _read_cases(draft: Draft) -> Finish | None:
 
     def first_round() -> None:
         """Let the study choose the cases of its first round."""
-        spec.report.results = models.study_results(replace(draft, axes=(), spread=None).study())
+        results = models.study_results(replace(draft, axes=(), spread=None).study())
+        known = {info.name for info in results}
+        told = [models.ResultInfo(name, "1", "") for name in spec.report.told if kind == "goal" and name not in known]
+        spec.report.results = (*results, *told)
         make_plan()
         spec.report.raise_if_any()
         assert draft.plan is not None

@@ -48,6 +48,10 @@ def modules() -> dict[str, str]:
     return {**texts, "__init__": f"{about}\n\n{imports}\n__all__ = {sorted(names)!r}\n"}
 
 
+#: Kinds of studies that choose their own cases and take no axes.
+CHOOSING = ("goal", "calibrate")
+
+
 def _class_name(model: str) -> str:
     return model.rpartition("-")[2].capitalize()
 
@@ -60,7 +64,8 @@ def _studies(fields: Schema) -> str:
     for name, part in kinds.items():
         required = part.get("required", ())
         asked = dict(sorted(part["properties"].items(), key=lambda item: item[0] not in required))
-        text += _method(name, part["description"], asked, required, f"self._with({name}=known({{fields}}))")
+        change = "_choosing" if name in CHOOSING else "_with"
+        text += _method(name, part["description"], asked, required, f"self.{change}({name}=known({{fields}}))")
     return text + _method("set", "other fields of the spec", others, (), "self._with({fields})")
 
 

@@ -9,9 +9,11 @@ import pytest
 
 import sprag_study as sprag
 from sprag_study.service.client import ArgumentError
+from sprag_study.service.client.queries import CASE_FIELDS, spec_of
 from sprag_study.service.plain_data import plain
 from sprag_study.service.presets import preset_names
 from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.kinds.registry import CASES
 from sprag_study.worker import models
 
 CLASSES: dict[str, Any] = {"vibration-drive": sprag.Drive, "machine-shaft": sprag.Shaft}
@@ -168,3 +170,25 @@ def test_a_draft_is_run_as_any_spec_is() -> None:
     with sprag.run(drive().vary(load=[0.0, 0.1]), processes=0) as study:
         assert len(study) == 2
         assert study.name == "untitled"
+
+
+def test_a_search_takes_the_place_of_what_varies() -> None:
+    draft = sprag.Drive.of("one_pendulum").set(combine="grid")
+    search = draft.goal(vary={"mass": (0.3, 0.6)}, best={"efficiency": "max"}, population=8, generations=2)
+    assert cases(search) == 8
+    measured = {"csv": "shaft.load,shaft.speed.mean\n0,4\n0.1,3\n0.2,2"}
+    assert dict(search.calibrate(unknown={"mass": (0.3, 0.6)}, measured=measured)).keys() & {"axes", "goal"} == set()
+    table = spec_of(search, cases={"shaft.load": [0.0, 0.1]})
+    assert table.keys() & CASE_FIELDS == {"axes"}
+
+
+def test_fields_that_say_which_cases_a_study_has_are_those_of_the_spec() -> None:
+    assert frozenset(CASES.fields) == CASE_FIELDS
+
+
+def test_a_number_in_a_condition_is_one() -> None:
+    goal = drive().goal(vary={"mass": (0.3, 0.6)}, subject_to=["efficiency >= 0.5", "torque.max <= 3 N*m"])
+    assert goal["goal"]["subject_to"][0]["at_least"] == 0.5
+    assert goal["goal"]["subject_to"][1]["at_most"] == "3 N*m"
+    limited = drive().goal(vary={"mass": (0.3, 0.6)}, best={"efficiency": "max"}, subject_to=["efficiency >= 0.5"])
+    assert cases(limited) == 100
