@@ -7,7 +7,8 @@ import json
 import os
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import urlsplit
@@ -17,7 +18,9 @@ import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, Request, expect, sync_playwright
 
 from tests.acceptance.processes import SECONDS, service
+from tests.service.conftest import Service
 from tests.service.timed_spec import SPEC
+from tests.serving import served
 
 # Pages wait for processes that start, on a machine that is busy with other tests.
 expect.set_options(timeout=1000 * SECONDS)
@@ -130,3 +133,16 @@ def visitor(browser: Browser, office: Office, request: pytest.FixtureRequest) ->
     context.close()
     assert found.hosts <= {urlsplit(office.address).netloc}
     assert found.errors == []
+
+
+@pytest.fixture
+def open_tab(service: Service, browser: Browser) -> Iterator[Callable[..., Page]]:
+    """Opens a tab at the service of this test, in a context with the options of the call."""
+    with served(service.app) as address, ExitStack() as contexts:
+
+        def opened(**options: Any) -> Page:
+            context = contexts.enter_context(browser.new_context(base_url=address, **options))
+            context.set_default_timeout(1000 * SECONDS)
+            return context.new_page()
+
+        yield opened

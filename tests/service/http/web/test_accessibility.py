@@ -13,14 +13,15 @@ from sprag_study.service.jobs.scheduler import Scheduler
 from sprag_study.service.presets import preset_text
 from sprag_study.service.schedules.fields import read_fields
 from sprag_study.service.spec.document import load_spec
-from tests.acceptance.processes import SECONDS
 from tests.service.calibrating import calibration
 from tests.service.http.web.fields import named
 from tests.service.searching import search
 from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page, Route
+    from collections.abc import Callable
+
+    from playwright.sync_api import Page
 
     from tests.service.conftest import Service
 
@@ -28,8 +29,55 @@ DESKTOP: Final = {"width": 1280, "height": 900}
 PHONE: Final = {"width": 390, "height": 800}
 TABLET: Final = {"width": 820, "height": 1180}
 DRAWN: Final = "() => [...document.querySelectorAll('[data-figure]')].every((plot) => plot.dataset.drawn)"
-#: One macro writes all operations of the interface: a few show what all would, in a fraction of the time.
-SHORTER: Final = "() => [...document.querySelectorAll('.operation')].slice(5).forEach((one) => one.remove())"
+#: Of siblings that are alike two stay, as axe would find the same in all: rows of a table, options, points of a figure;
+#: of the operations of the interface, which one macro writes, five. With ``once``, what an earlier page of the tab had
+#: in the same place goes too. Elements are alike if what they contain is alike, with the same attributes; of texts only
+#: that there is one counts, of references that they lead somewhere. What could be scrolled still can.
+#: Gives the ids that the page has twice.
+SHORTER: Final = """(once) => {
+  const texts = new Set(("id name value title alt href src srcset action formaction content datetime style width "
+    + "height x y x1 x2 y1 y2 dx dy cx cy r rx ry d points transform viewBox aria-label min max step placeholder"
+  ).split(" "));
+  const references = new Set(["for", "list", "form", "aria-labelledby", "aria-describedby", "aria-controls"]);
+  const removable = new Set(["TR", "LI", "OPTION", "DIV", "DETAILS", "P", "DT", "DD", "SECTION", "ARTICLE", "FIELDSET",
+    "HEADER", "NAV", "FOOTER"]);
+  const ids = [...document.querySelectorAll("[id]")].map((e) => e.id), known = new Set(ids);
+  const kept = JSON.parse(sessionStorage.getItem("shapes") ?? "[[], []]");
+  const numbers = new Map(kept[0]), before = new Set(kept[1]), places = new Set(kept[1]);
+  const value = (a) => texts.has(a.name) || a.name.startsWith("data-") ? a.value !== ""
+    : references.has(a.name) ? a.value.split(" ").every((id) => known.has(id)) : a.value;
+  const numbered = (...parts) => {
+    const told = parts.join("|");
+    if (!numbers.has(told)) numbers.set(told, numbers.size);
+    return numbers.get(told);
+  };
+  const shape = (e, above) => {
+    const outside = numbered(above, e.tagName, ...[...e.attributes].map((a) => `${a.name}=${value(a)}`));
+    const counts = new Map(), inside = [];
+    for (const child of [...e.childNodes]) {
+      if (child.nodeType === Node.TEXT_NODE && child.data.trim() !== "") inside.push("text");
+      if (child.nodeType !== Node.ELEMENT_NODE) continue;
+      const number = shape(child, outside), count = (counts.get(number) ?? 0) + 1;
+      counts.set(number, count);
+      if (count <= 2) inside.push(number);
+      const alike = count > 2 || (once && before.has(number));
+      if (alike && (removable.has(child.tagName) || child.ownerSVGElement)) child.remove();
+    }
+    const number = numbered(outside, "", ...inside);
+    places.add(number);
+    return number;
+  };
+  const scrolled = [...document.querySelectorAll("main *")].filter((e) => e.clientHeight > 0
+    && (e.scrollHeight > e.clientHeight || e.scrollWidth > e.clientWidth) && getComputedStyle(e).overflow !== "visible"
+  ).map((e) => [e, e.scrollHeight, e.scrollWidth]);
+  [...document.querySelectorAll(".operation")].slice(5).forEach((one) => one.remove());
+  shape(document.body, "");
+  for (const [e, height, width] of scrolled) {
+    Object.assign(e.firstElementChild?.style ?? {}, { minHeight: `${height}px`, minWidth: `${width}px` });
+  }
+  if (once) sessionStorage.setItem("shapes", JSON.stringify([[...numbers], [...places]]));
+  return ids.filter((id, at) => known.size < ids.length && ids.indexOf(id) !== at);
+}"""
 #: Rules whose findings depend on colours, on the width and on the language.
 NARROW: Final = [
     "color-contrast", "link-in-text-block", "scrollable-region-focusable", "target-size",
@@ -132,70 +180,49 @@ def night(service: Service) -> None:
     assert all(run["stages"] for run in service.get("/night")["runs"])
 
 
-def serve(page: Page, service: Service) -> None:
-    """Let the service in this process answer the browser."""
-
-    def answer(route: Route) -> None:
-        request = route.request
-        if request.headers.get("accept") == "text/event-stream":  # has no end
-            route.abort()
-            return
-        found = service.http.request(
-            request.method,
-            request.url,
-            headers=request.headers,
-            content=request.post_data_buffer,
-            follow_redirects=True,
-        )
-        route.fulfill(status=found.status_code, headers=dict(found.headers), body=found.content)
-
-    page.route("**/*", answer)
-
-
 def findings(page: Page, axe: Axe, options: dict[str, Any]) -> list[str]:
     """What axe finds on the page as it is."""
     found = axe.run(page, options={"resultTypes": ["violations"], "selectors": False, **options}).response["violations"]
     return [f"{one['id']}: {node['html'][:200]}" for one in found for node in one["nodes"]]
 
 
-def test_axe_finds_nothing_on_any_page_and_each_fits_the_screen(service: Service, browser: Browser) -> None:
+def test_axe_finds_nothing_on_any_page_and_each_fits_the_screen(
+    service: Service, open_tab: Callable[..., Page]
+) -> None:
     """In English, light and wide; in Ukrainian, dark and narrow: these show what any other combination would."""
+    english = open_tab(locale="en-GB", viewport=DESKTOP, color_scheme="light")
+    ukrainian = open_tab(locale="uk-UA", viewport=PHONE, color_scheme="dark")
+    pages = (english, ukrainian)
     axe, found = Axe(), dict[str, list[str]]()
-    english, ukrainian = (
-        browser.new_context(base_url="http://localhost", locale=locale, viewport=size, color_scheme=scheme).new_page()
-        for locale, size, scheme in (("en-GB", DESKTOP, "light"), ("uk-UA", PHONE, "dark"))
-    )
-    for page in (english, ukrainian):
-        page.set_default_timeout(1000 * SECONDS)
-        serve(page, service)
 
     def judge(name: str) -> None:
+        for size in (TABLET, PHONE):
+            ukrainian.set_viewport_size(size)
+            if beside := ukrainian.evaluate(BEYOND):
+                found[f"{name}, wider than {size['width']} px"] = [beside]
+        for page in pages:
+            if twice := page.evaluate(SHORTER, page is ukrainian):
+                found[f"{name}, ids"] = twice
         if bad := findings(english, axe, {}):
             found[name] = bad
         if bad := findings(ukrainian, axe, {"runOnly": NARROW}):
             found[f"{name}, in Ukrainian, dark and narrow"] = bad
-        for size in (PHONE, TABLET):
-            ukrainian.set_viewport_size(size)
-            if beside := ukrainian.evaluate(BEYOND):
-                found[f"{name}, wider than {size['width']} px"] = [beside]
-        ukrainian.set_viewport_size(PHONE)
 
-    for page in (english, ukrainian):
+    for page in pages:
         page.goto("/")
     judge("an empty list")
-    for page in (english, ukrainian):
+    for page in pages:
         page.goto("/new?preset=one_pendulum")
         named(page, "/base/shaft/inertia").fill("2 mm")
         page.locator('button[value="submit"]').first.click()
     judge("a refused form")
     ids = studies(service)
     for address in (address.format(**ids) for addresses in PAGES.values() for address in addresses):
-        for page in (english, ukrainian):
+        for page in pages:
             answer = page.goto(address)
             assert answer is not None, address
             assert answer.headers["content-type"].startswith("text/html"), address
             page.wait_for_function(DRAWN)
-            page.evaluate(SHORTER)
         judge(address)
     assert not found, json.dumps(found, indent=1)
     assert ukrainian.locator("html").get_attribute("lang") == "uk"

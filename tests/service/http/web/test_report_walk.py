@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.acceptance.processes import SECONDS
-from tests.service.http.web.test_accessibility import serve
 from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
-    from playwright.sync_api import Browser
+    from playwright.sync_api import Page
 
     from sprag_study.service.settings import Settings
     from tests.service.conftest import Service
@@ -50,13 +49,10 @@ def test_a_phone_has_charts_of_its_own_width_in_a_report(visitor: Visitor, examp
     assert drawing["y"] < 800
 
 
-def test_a_report_with_a_logo_in_ukrainian(browser: Browser, service: Service) -> None:
+def test_a_report_with_a_logo_in_ukrainian(open_tab: Callable[..., Page], service: Service) -> None:
     study_id = service.submit({**SPEC, "name": "Привод живильника", "axes": []})
     service.fill(study_id)
-    context = browser.new_context(base_url="http://localhost", locale="uk-UA", java_script_enabled=False)
-    context.set_default_timeout(100 * SECONDS)
-    page = context.new_page()
-    serve(page, service)
+    page = open_tab(locale="uk-UA", java_script_enabled=False)
     page.goto(f"/studies/{study_id}")
     page.locator(f'a[href="/studies/{study_id}/document"]').click()
     page.wait_for_url("**/document")
@@ -83,4 +79,3 @@ def test_a_report_with_a_logo_in_ukrainian(browser: Browser, service: Service) -
     assert "Брати до 0,30 Н·м." in file
     for text in page.locator("article.sheet :is(h2, td, th, figcaption)").all_inner_texts():
         assert text.strip() in html.unescape(file)
-    context.close()

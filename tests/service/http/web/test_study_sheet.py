@@ -15,15 +15,15 @@ from sprag_study.worker import models
 from sprag_study.worker.models import ChunkResult
 from tests.service.calibrating import calibration
 from tests.service.http.web.fields import named
-from tests.service.http.web.test_accessibility import BEYOND, preset, serve
+from tests.service.http.web.test_accessibility import BEYOND, preset
 from tests.service.rounds import run_round
 from tests.service.searching import GOAL, search, search_of, spec_of
 from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable
 
-    from playwright.sync_api import Browser, Locator, Page
+    from playwright.sync_api import Locator, Page
 
     from sprag_study.worker.study import Study
     from tests.service.conftest import Service
@@ -96,14 +96,9 @@ def kinds(service: Service) -> dict[str, str]:
 
 
 @pytest.fixture
-def page(service: Service, browser: Browser, request: pytest.FixtureRequest) -> Iterator[Page]:
-    """A page whose requests this process answers."""
-    options = {"base_url": "http://localhost", "viewport": WIDE, **getattr(request, "param", {})}
-    context = browser.new_context(**options)
-    opened = context.new_page()
-    serve(opened, service)
-    yield opened
-    context.close()
+def page(open_tab: Callable[..., Page], request: pytest.FixtureRequest) -> Page:
+    """A tab on a desk, or as the test has it."""
+    return open_tab(**{"viewport": WIDE, **getattr(request, "param", {})})
 
 
 def within(page: Page, part: Locator) -> bool:
