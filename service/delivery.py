@@ -97,6 +97,13 @@ class DeliverySettings(BaseSettings):
         "`SPRAG_WEBHOOK_ORIGINS`",
     )
 
+    alert_to: Annotated[tuple[str, ...], NoDecode] = Field(
+        validate_default=True,
+        default=(),
+        description="mail addresses and addresses of webhooks, separated by commas, that are told when the nightly "
+        "backup fails or a disk fills; empty: administrators whose names are mail addresses",
+    )
+
     @field_validator("public_url")
     @classmethod
     def _http_address(cls, value: str) -> str:
@@ -158,6 +165,17 @@ class DeliverySettings(BaseSettings):
         if value is not None:
             secret_bytes(value.get_secret_value())
         return value
+
+    @field_validator("alert_to", mode="before")
+    @classmethod
+    def _alerted(cls, value: object, info: ValidationInfo) -> object:
+        texts = _texts(value)
+        if texts is None:
+            return value
+        for text in texts:
+            if not is_mail_address(text) and origin_of(text) not in info.data.get("webhook_origins", ()):
+                raise ValueError("mail addresses are needed, or addresses at SPRAG_WEBHOOK_ORIGINS")
+        return tuple(texts)
 
     def delivery(self, own_url: str, prefix: str = "") -> Delivery:
         """How reports leave the service, whose address is ``own_url`` unless another is set; ``prefix`` is its path."""

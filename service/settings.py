@@ -180,6 +180,13 @@ class Settings(DeliverySettings, OidcSettings):
         default="", description="folder to which the worker writes a backup of the database every night; empty: none"
     )
     backup_keep: int = Field(default=14, ge=1, le=10_000, description="backups that are kept, the latest ones")
+    disk_free: int = Field(
+        default=1024,
+        ge=0,
+        le=2**40,
+        description="MiB that should be free on the disks of the database and the backups; administrators are told "
+        "when less is; 0: they are not watched",
+    )
     keep_days: int = Field(
         default=0, ge=0, le=36_500, description="days after which a study that has ended is deleted; 0: never"
     )

@@ -29,7 +29,7 @@ _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "sqlalchemy", "fastapi", "u
 _KERNEL = {"pendulums": 1, "coefficients": 4, "tolerance": 1e-9}
 #: Backups are made every night.
 _OLD_BACKUP = timedelta(hours=49)
-#: A study of a million cases of one pendulum takes about half of this.
+#: Where the settings say nothing; a study of a million cases of one pendulum takes about half of this.
 _LEAST_FREE_BYTES = 1_000_000_000
 
 
@@ -121,6 +121,7 @@ def _checks(db: str | None) -> dict[str, Callable[[], tuple[bool, str]]]:
         _("clock"): lambda: _clock(url, file),
         _("workers"): lambda: _workers(url, file),
         _("schedules"): lambda: _schedules(url, file),
+        _("alerts"): lambda: _alerts(url, file),
         **here,
         _("kernel cache"): _cache,
         _("engine"): _known_values,
@@ -252,10 +253,23 @@ def _schedules(url: str, file: Path | None) -> tuple[bool, str]:
     return True, _("{count} schedules, none is late", count=schedules)
 
 
+def _alerts(url: str, file: Path | None) -> tuple[bool, str]:
+    """Whether a backup failed, or a disk filled, and has not been well since."""
+    from sprag_study.service.reading.reader import shown_stored
+    from sprag_study.service.storage.store import Store
+
+    if file is not None and not file.exists():
+        return True, _("none yet")
+    with Store.open(url, create=False) as store:
+        alerts = store.alerts.present()
+    return not alerts, " ".join(shown_stored(alert.problem) for alert in alerts) or _("none")
+
+
 def _disk(location: Path) -> tuple[bool, str]:
     folder = next(parent for parent in location.absolute().parents if parent.exists())
     free = shutil.disk_usage(folder).free
-    return free >= _LEAST_FREE_BYTES, _("{size} GB free at {folder}", size=decimal(f"{free / 1e9:.3g}"), folder=folder)
+    least = read_settings().disk_free * 2**20 or _LEAST_FREE_BYTES
+    return free >= least, _("{size} GB free at {folder}", size=decimal(f"{free / 1e9:.3g}"), folder=folder)
 
 
 def _backups() -> tuple[bool, str]:

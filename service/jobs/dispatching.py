@@ -74,7 +74,15 @@ def worker_settings(settings: Settings) -> WorkerSettings:
     """The part of ``settings`` that a dispatcher needs."""
     folder = Path(settings.backup_folder).expanduser().absolute() if settings.backup_folder else None
     nightly = (settings.nightly_at, settings.zone)
-    plan = MaintenancePlan(folder, settings.backup_keep, settings.keep_days, *nightly, settings.audit_days)
+    plan = MaintenancePlan(
+        folder,
+        settings.backup_keep,
+        settings.keep_days,
+        *nightly,
+        settings.audit_days,
+        settings.disk_free * 2**20,
+        settings.alert_to,
+    )
     return WorkerSettings(
         settings.database_url,
         settings.pool_processes,

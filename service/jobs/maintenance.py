@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 import re
+import shutil
 import socket
 import threading
 from collections.abc import Callable
@@ -17,7 +18,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from sprag_study.sentences import Amount, Sentence
 from sprag_study.service.actor import Actor, Door, act_as
+from sprag_study.service.languages import recorded
 from sprag_study.service.schedules.times import Timing, read_time_of_day
 from sprag_study.service.stale_files import sweep
 from sprag_study.service.storage.clock_watch import ClockWatch
@@ -26,6 +29,7 @@ from sprag_study.service.storage.errors import StoreError
 from sprag_study.service.storage.maintenance import PART_SUFFIX
 
 if TYPE_CHECKING:
+    from sprag_study.service.storage.alerts import AlertKind
     from sprag_study.service.storage.store import Store
 
 _LOG = logging.getLogger("sprag.maintenance")
@@ -37,12 +41,16 @@ AGAIN = timedelta(minutes=10)
 REPORTS_KEPT: Final = timedelta(days=90)
 _NAME: Final = re.compile(r"sprag-(\d{8}T\d{6}Z)\.sqlite3")
 _STAMP: Final = "%Y%m%dT%H%M%SZ"
+_BACKUP: Final = "backup"
+#: All is well again when so many times the least is free: a disk at the limit is said once.
+_WELL: Final = 1.1
 
 
 @dataclass(frozen=True, slots=True)
 class MaintenancePlan:
     """Folder of the backups (None: no backups) and how many to keep; days to keep ended studies (0: for ever); time;
-    days to keep the audit log (0: for ever).
+    days to keep the audit log (0: for ever); bytes that should be free on the disks (0: any number will do), and who
+    is told when less is, or a backup fails (`Alerts.begin`).
     """
 
     folder: Path | None = None
@@ -51,6 +59,8 @@ class MaintenancePlan:
     time: str = "02:30"
     zone: str = "UTC"
     audit_days: int = 0
+    least_free: int = 1024 * 2**20
+    alert_to: tuple[str, ...] = ()
 
     @property
     def timing(self) -> Timing:
@@ -97,7 +107,7 @@ class Maintenance(threading.Thread):
         self._tasks: list[_Task] = []
         self._tasks.append(_Task("deletion of old reports", self._prune_reports))
         if plan.folder is not None:
-            self._tasks.append(_Task("backup", partial(self._back_up, plan.folder)))
+            self._tasks.append(_Task(_BACKUP, partial(self._back_up, plan.folder)))
         if plan.study_days:
             self._tasks.append(_Task("deletion of old studies", self._prune))
         if plan.audit_days:
@@ -123,6 +133,7 @@ class Maintenance(threading.Thread):
     def _look(self, now: datetime) -> None:
         due = self._plan.timing.latest_until(now)
         assert due is not None, "a time of day comes every day"
+        self._look_at_disks()
         try:
             believed = self._watch.believable()
         except StoreError as error:
@@ -143,8 +154,45 @@ class Maintenance(threading.Thread):
                     exc_info=None if known else error,
                 )
                 task.wait_until = now + AGAIN
+                if task.name == _BACKUP:
+                    problem = str(error).strip().removesuffix(".") or type(error).__name__
+                    self._alert("backup", Sentence(recorded.BACKUP_FAILED, problem=problem))
                 continue
+            if task.name == _BACKUP:
+                self._alert("backup", None)
             task.done, task.wait_until = due, None
+
+    def _look_at_disks(self) -> None:
+        """Begin or end the alert of the disks of the database and of the backups."""
+        least, session = self._plan.least_free, self._store.session
+        if not least:
+            return
+        folders = [
+            *([] if session.on_server else [session.path.parent]),
+            *([self._plan.folder] if self._plan.folder else []),
+        ]
+        free = {folder: shutil.disk_usage(folder).free for folder in folders if folder.is_dir()}
+        if not free:
+            return
+        fullest = min(free, key=lambda folder: free[folder])
+        if free[fullest] < least:
+            megabytes = {"free": Amount(free[fullest] / 1e6, digits=3), "least": Amount(least / 1e6, digits=4)}
+            self._alert("disk", Sentence(recorded.DISK_LOW, path=str(fullest), **megabytes))
+        elif free[fullest] >= _WELL * least:
+            self._alert("disk", None)
+
+    def _alert(self, kind: AlertKind, problem: Sentence | None) -> None:
+        """Begin the alert, or end it where there is no problem; a copy of the deployment says nothing to anybody."""
+        try:
+            if problem is None:
+                if self._store.alerts.end(kind):
+                    _LOG.info("All is well again: %s.", kind)
+                return
+            copy, plan = self._store.deployment.is_copy(), self._plan
+            if not copy and self._store.alerts.begin(kind, problem, plan.alert_to, plan.zone):
+                _LOG.error("%s", problem)
+        except StoreError as error:
+            _LOG.warning("An alert is noted later: %s", error)
 
     def _back_up(self, folder: Path, now: datetime, due: datetime, believed: bool) -> bool:
         """Write a backup unless there is one since ``due``; then remove the oldest."""

@@ -22,7 +22,7 @@ from sprag_study.service.storage.stored_sentences import sentence_in, written
 from sprag_study.service.storage.tables import METADATA
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
     from datetime import datetime
 
 AlertKind = Literal["backup", "disk"]
@@ -53,11 +53,11 @@ class Alert:
 class Alerts(Part):
     """The alerts of a database."""
 
-    def begin(self, kind: AlertKind, problem: Sentence, targets: Iterable[str]) -> bool:
+    def begin(self, kind: AlertKind, problem: Sentence, targets: Sequence[str] = (), zone: str = "UTC") -> bool:
         """Note that something is wrong, and add a report to each of the ``targets``; False where it is known.
 
         A target is a mail address or the address of a webhook; without any, administrators whose names are mail
-        addresses get one.
+        addresses get one. Reports have times of the ``zone``.
         """
         with self.session.read() as connection:
             if kind in connection.execute(sa.select(_A.kind)).scalars().all():
@@ -71,6 +71,7 @@ class Alerts(Part):
                 "alert": kind,
                 "sentence": str(problem),
                 "begun": moment(now).isoformat(),
+                "zone": zone,
                 "known": {"sentence_values": problem.to_json()},
             }
             note(connection, now, "alert.begin", kind, problem=str(problem))
@@ -91,7 +92,7 @@ class Alerts(Part):
     def present(self) -> tuple[Alert, ...]:
         """Every alert whose cause is still there, earliest first."""
         rows = self._all(sa.select(ALERTS).order_by(_A.begun_at, _A.kind))
-        return tuple(Alert(row.kind, moment(row.begun_at), str(sentence_in(row, "problem"))) for row in rows)
+        return tuple(Alert(row.kind, moment(row.begun_at), sentence_in(row, "problem") or "") for row in rows)
 
 
 def _administrators(connection: sa.Connection) -> list[str]:

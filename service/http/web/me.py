@@ -12,6 +12,7 @@ from starlette.responses import RedirectResponse, Response
 
 from sprag_study.service import languages
 from sprag_study.service.actor import Role
+from sprag_study.service.delivery import origin_of
 from sprag_study.service.exports.audit import entry_json
 from sprag_study.service.faults import FaultError, choice_of
 from sprag_study.service.http.access import COOKIE
@@ -246,10 +247,11 @@ def try_reports(context: Ctx, values: Form) -> Response:
         shown = {"problem": _("Another test is being sent: try again when it has come to an end.")}
     else:
         try:
-            context.store.audit.note("report.test", to[:_LONGEST], by=by)
+            logged = to if by == "mail" else origin_of(to) or ""  # the path of a webhook can be a secret
+            context.store.audit.note("report.test", logged[:_LONGEST], by=by)
             send(to, context.settings.reports, context.store.clock.now())
         except DeliveryError as error:
-            shown = {"problem": shown_stored(str(error))}
+            shown = {"problem": shown_stored(error.sentence)}
         else:
             status, shown = 200, {"sent": to}
         finally:
@@ -274,6 +276,7 @@ def workers(context: Ctx) -> Response:
         found=worker_list(context.store.dispatchers),
         backups=_backups(folder),
         folder=folder,
+        alerts=context.store.alerts.present(),
     )
 
 

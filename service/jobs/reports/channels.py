@@ -15,7 +15,9 @@ import time
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag_study.sentences import Amount, Sentence
 from sprag_study.service.delivery import origin_of
+from sprag_study.service.languages import N_
 from sprag_study.service.schedules.report_to import mail_allowed
 
 if TYPE_CHECKING:
@@ -32,13 +34,15 @@ MOST_SECONDS: Final = 60.0
 #: Answers of a webhook that mean that it is gone for good, and replies of a mail server that are final begin here.
 _GONE: Final = 410
 _PERMANENT: Final = 500
+_REFUSED: Final = N_("The mail server refused: {reply}.")
 
 
 class DeliveryError(Exception):
-    """A report that was not sent; the message is one sentence. ``permanent``: trying again is no use."""
+    """A report that was not sent, and why. ``permanent``: trying again is no use."""
 
-    def __init__(self, message: str, *, permanent: bool = False) -> None:
-        super().__init__(message)
+    def __init__(self, sentence: Sentence, *, permanent: bool = False) -> None:
+        super().__init__(str(sentence))
+        self.sentence = sentence
         self.permanent = permanent
 
 
@@ -46,9 +50,11 @@ def send_mail(message: EmailMessage, delivery: Delivery, context: ssl.SSLContext
     """Send a mail; raises DeliveryError. ``context`` decides which certificates are trusted; default: the system's."""
     server = delivery.mail_server
     if server is None:
-        raise DeliveryError("No mail server is set (SPRAG_SMTP_URL).")
+        raise DeliveryError(Sentence("No mail server is set (SPRAG_SMTP_URL)."))
     if not mail_allowed(str(message["To"]), delivery):
-        raise DeliveryError(f"{message['To']} has a domain to which no reports go (SPRAG_MAIL_DOMAINS).")
+        raise DeliveryError(
+            Sentence("{address} has a domain to which no reports go (SPRAG_MAIL_DOMAINS).", address=str(message["To"]))
+        )
     began = time.monotonic()
     try:
         connection = _connected(server, context or ssl.create_default_context())
@@ -66,11 +72,15 @@ def send_mail(message: EmailMessage, delivery: Delivery, context: ssl.SSLContext
     except smtplib.SMTPResponseException as error:
         # A wrong password or a busy server is the administrator's to correct: it is tried again.
         permanent = isinstance(error, smtplib.SMTPDataError) and error.smtp_code >= _PERMANENT
-        raise DeliveryError(f"The mail server refused: {_text(error)}.", permanent=permanent) from error
+        raise DeliveryError(Sentence(_REFUSED, reply=_text(error)), permanent=permanent) from error
     except (smtplib.SMTPException, OSError) as error:
-        late = time.monotonic() - began >= MOST_SECONDS
-        reason = f"it did not take the report within {MOST_SECONDS:g} s" if late else error
-        raise DeliveryError(f"The mail server {server.host}:{server.port} cannot be used: {reason}.") from error
+        place = f"{server.host}:{server.port}"
+        if time.monotonic() - began >= MOST_SECONDS:
+            late = N_("The mail server {place} cannot be used: it did not take the report within {seconds}.")
+            raise DeliveryError(Sentence(late, place=place, seconds=Amount(MOST_SECONDS, "s"))) from error
+        raise DeliveryError(
+            Sentence("The mail server {place} cannot be used: {reason}.", place=place, reason=str(error))
+        ) from error
 
 
 class _Limited(smtplib.SMTP):
@@ -148,7 +158,7 @@ def _connected(server: MailServer, context: ssl.SSLContext) -> smtplib.SMTP:
 
 def _refusal(code: int, text: bytes | str) -> DeliveryError:
     reply = text.decode("utf-8", "replace") if isinstance(text, bytes) else text
-    return DeliveryError(f"The mail server refused: {code} {reply}.", permanent=code >= _PERMANENT)
+    return DeliveryError(Sentence(_REFUSED, reply=f"{code} {reply}"), permanent=code >= _PERMANENT)
 
 
 def _text(error: smtplib.SMTPResponseException) -> str:
@@ -179,7 +189,7 @@ def send_webhook(report: Claimed, body: bytes, delivery: Delivery, now: datetime
     import httpx  # an eighth of the time to import all of a dispatcher, few of which send anything
 
     if delivery.secret is None or origin_of(report.target) not in delivery.origins:
-        raise DeliveryError("Its origin is not one to which webhooks go (SPRAG_WEBHOOK_ORIGINS).")
+        raise DeliveryError(Sentence("Its origin is not one to which webhooks go (SPRAG_WEBHOOK_ORIGINS)."))
     seconds = int(now.timestamp())
     headers = {
         "Content-Type": "application/json",
@@ -191,8 +201,12 @@ def send_webhook(report: Claimed, body: bytes, delivery: Delivery, now: datetime
     try:
         status = asyncio.run(_posted(report.target, body, headers))
     except TimeoutError:
-        raise DeliveryError(f"The webhook did not answer within {MOST_SECONDS:g} s.") from None
+        raise DeliveryError(
+            Sentence("The webhook did not answer within {seconds}.", seconds=Amount(MOST_SECONDS, "s"))
+        ) from None
     except (httpx.HTTPError, httpx.InvalidURL) as error:
-        raise DeliveryError(f"The webhook cannot be reached: {type(error).__name__}: {error}.") from error
+        reason = f"{type(error).__name__}: {error}"
+        raise DeliveryError(Sentence("The webhook cannot be reached: {reason}.", reason=reason)) from error
     if not 200 <= status < 300:
-        raise DeliveryError(f"The webhook answered {status}.", permanent=status == _GONE)
+        answered = Sentence("The webhook answered {status}.", status=str(status))
+        raise DeliveryError(answered, permanent=status == _GONE)

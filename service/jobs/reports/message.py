@@ -27,7 +27,14 @@ if TYPE_CHECKING:
 
 _CURVE: Final = "curve"
 #: What the addresses of `links` lead to.
-_LINKS: Final = {"study": N_("Study"), "schedule": N_("Schedule"), "night": N_("Night")}
+_LINKS: Final = {
+    "study": N_("Study"),
+    "schedule": N_("Schedule"),
+    "night": N_("Night"),
+    "workers": N_("Workers and backups"),
+}
+#: What alerts are about.
+_ALERTS: Final = {"backup": N_("the nightly backup failed"), "disk": N_("a disk fills")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +47,8 @@ class Fact:
 
 def subject(content: dict[str, Any]) -> str:
     """The subject of a mail: the schedule, and whether somebody should look."""
+    if "alert" in content:
+        return _("Sprag: needs attention: {what}", what=_(_ALERTS[content["alert"]]))
     outcome = content.get("outcome")
     result = _("did not run") if outcome is None else _(outcome["result"])
     if outcome is not None and outcome["cases"]:
@@ -66,6 +75,9 @@ def sentence(content: dict[str, Any]) -> str:
 
 def facts(content: dict[str, Any]) -> Iterator[Fact]:
     """The lines of a report."""
+    if "alert" in content:
+        yield Fact(_("Since"), wall_clock(datetime.fromisoformat(content["begun"]), content["zone"]))
+        return
     yield Fact(_("Due"), wall_clock(datetime.fromisoformat(content["due"]), content["zone"]))
     outcome = content.get("outcome")
     if outcome is None:
@@ -93,7 +105,9 @@ def _cases(count: int) -> str:
 
 
 def links(content: dict[str, Any], public_url: str) -> dict[str, str]:
-    """Addresses of the pages of the study, the schedule and the last night."""
+    """Addresses of the pages of the study, the schedule and the last night; of an alert, that of the workers."""
+    if "alert" in content:
+        return {"workers": f"{public_url}/me/workers"}
     study = {"study": f"{public_url}/studies/{content['study']}"} if content.get("study") else {}
     return {**study, "schedule": f"{public_url}/nights/{content['schedule']}", "night": f"{public_url}/nights"}
 
@@ -147,7 +161,7 @@ def _set_subject(message: EmailMessage, text: str) -> None:
 def webhook_body(report: Claimed, delivery: Delivery) -> bytes:
     """The report as the body of a webhook; it is the same each time that it is sent."""
     content = report.content
-    kind = "schedule.run" if "outcome" in content else "schedule.overdue"
+    kind = "schedule.run" if "outcome" in content else "alert" if "alert" in content else "schedule.overdue"
     own = {name: value for name, value in content.items() if name != "known"}
     data = {**own, "sentence": sentence(content), "links": links(content, delivery.public_url)}
     return to_bytes({"type": kind, "timestamp": timestamp(report.created_at), "data": data})

@@ -7,6 +7,7 @@ import socket
 from datetime import timedelta
 from typing import TYPE_CHECKING, Final
 
+from sprag_study.sentences import Sentence
 from sprag_study.service.actor import Actor, Door, act_as
 from sprag_study.service.jobs.polling import PollingThread
 from sprag_study.service.jobs.reports.channels import DeliveryError, send_mail, send_webhook
@@ -65,10 +66,10 @@ class Reporter(PollingThread):
             return
         except Exception:  # one report must not keep the others from being sent
             _LOG.exception("The report %s cannot be made", report.id)
-            self._failed(report, DeliveryError("The report cannot be made; the log says why."))
+            self._failed(report, DeliveryError(Sentence("The report cannot be made; the log says why.")))
             return
         self._store.reports.sent(report)
-        _LOG.info("The report %s of the schedule %s was sent by %s.", report.id, report.schedule, report.channel)
+        _LOG.info("The report %s of %s was sent by %s.", report.id, _subject(report), report.channel)
 
     def _failed(self, report: Claimed, error: DeliveryError) -> None:
         now = self._store.clock.now()
@@ -77,9 +78,9 @@ class Reporter(PollingThread):
         again = None if error.permanent or now + pause - report.created_at > GIVEN_UP_AFTER else now + pause
         self._store.reports.failed(report, str(error), again)
         if again is None:
-            _LOG.error("The report %s of the schedule %s is given up: %s", report.id, report.schedule, error)
+            _LOG.error("The report %s of %s is given up: %s", report.id, _subject(report), error)
         elif report.attempts == 1:
-            _LOG.warning("The report %s of the schedule %s is tried again: %s", report.id, report.schedule, error)
+            _LOG.warning("The report %s of %s is tried again: %s", report.id, _subject(report), error)
 
     def _curve(self, report: Claimed) -> bytes | None:
         """The curve of the study; None where there is none, or it cannot be drawn."""
@@ -94,3 +95,8 @@ class Reporter(PollingThread):
         except Exception as error:  # a report without its picture is better than none
             _LOG.warning("The report %s has no curve: %s", report.id, error)
             return None
+
+
+def _subject(report: Claimed) -> str:
+    """What a report is about, for the log."""
+    return f"the schedule {report.schedule}" if report.schedule else "the deployment"

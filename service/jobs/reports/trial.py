@@ -8,6 +8,7 @@ from email.policy import SMTP
 from email.utils import format_datetime
 from typing import TYPE_CHECKING
 
+from sprag_study.sentences import Sentence
 from sprag_study.service.delivery import is_mail_address
 from sprag_study.service.jobs.reports.channels import DeliveryError, send_mail, send_webhook
 from sprag_study.service.json_text import timestamp, to_bytes
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 def try_mail(address: str, delivery: Delivery, now: datetime) -> None:
     """Send a test mail, in the language of mails; raises DeliveryError."""
     if not is_mail_address(address):
-        raise DeliveryError(f"{address!r} is not a mail address.")
+        raise DeliveryError(Sentence("{address} is not a mail address.", address=repr(address)))
     message = EmailMessage(policy=SMTP)
     with language(delivery.language):
         message["From"], message["To"], message["Subject"] = delivery.sender, address, _("Test mail of Sprag")

@@ -290,6 +290,12 @@ def test_a_test_mail_and_a_test_webhook_are_sent(
         ((path, _headers, body),) = hook.requests
         assert (path, json.loads(body)["type"]) == ("/here", "test")
         assert send("webhook", "https://elsewhere.example/x")[0] == 422
+        ada.headers["Accept-Language"] = "uk"
+        assert send("mail", "nobody@example.com")[1] == "Поштовий сервер відмовив: 550 unknown."
+        assert "не належить до тих, куди надсилаються вебхуки" in send("webhook", "https://elsewhere.example/x")[1]
+        targets = [row.target for row in service.store.audit.rows(AuditFilter(action="report.test"))]
+        assert origin_of(hook.address) in targets  # without its path, which can be a secret
+        assert f"{hook.address}/here" not in targets
         assert len(box.mails) == 1
         assert len(hook.requests) == 1
 
