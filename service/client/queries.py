@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, KeysView, Mapping, Sequence, Set, ValuesView
+from difflib import get_close_matches
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
@@ -56,7 +57,9 @@ def _named_spec(spec: str | PathLike[str]) -> dict[str, Any]:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise SpecFileError(f"cannot read a spec from the file {str(path)!r}: {reason}") from error
+        near = get_close_matches(str(spec), preset_names(), 1)
+        hint = f"; a study that comes with Sprag is called {near[0]!r}" if near else ""
+        raise SpecFileError(f"cannot read a spec from the file {str(path)!r}: {reason}{hint}") from error
     return _read(path, text)
 
 

@@ -10,6 +10,9 @@ from os import PathLike
 from pathlib import Path
 from typing import Final
 
+from sprag_study.service.client.errors import ArgumentError
+from sprag_study.service.formats import PICTURES
+
 #: x and y of one curve; None and NaN leave a gap.
 Line = tuple[Sequence[float | None], Sequence[float | None]]
 
@@ -22,19 +25,31 @@ _MOST: Final = 12
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Picture:
-    """A picture as SVG, which notebooks show."""
+    """A picture, which notebooks show where it is SVG or PNG; ``form`` is "svg", "png" or "pdf"."""
 
-    svg: bytes
+    content: bytes
+    form: str = "svg"
 
     def __repr__(self) -> str:
-        return f"Picture(SVG, {len(self.svg):,} bytes)"
+        return f"Picture({self.form.upper()}, {len(self.content):,} bytes)"
 
-    def _repr_svg_(self) -> str:
-        return self.svg.decode()
+    @property
+    def svg(self) -> bytes:
+        """The content of a picture as SVG."""
+        return self.content
+
+    def _repr_svg_(self) -> str | None:
+        return self.content.decode() if self.form == "svg" else None
+
+    def _repr_png_(self) -> bytes | None:
+        return self.content if self.form == "png" else None
 
     def save(self, file: str | PathLike[str]) -> None:
-        """Write the SVG to a file."""
-        Path(file).write_bytes(self.svg)
+        """Write the picture to a file; ArgumentError where its name ends like another format."""
+        known = Path(file).suffix[1:].lower()
+        if known in PICTURES and known != self.form:
+            raise ArgumentError("file", str(file), f".{self.form}, or this name as `file` of `plot`")
+        Path(file).write_bytes(self.content)
 
 
 def sketch(x_caption: str, y_caption: str, lines: Sequence[Line]) -> str:

@@ -187,44 +187,6 @@ class StudyTables(StudyPart):
         with opened as pieces:
             yield pieces
 
-    def picture(
-        self,
-        file: str | PathLike[str],
-        x: str | None = None,
-        y: str | Sequence[str] = (),
-        *,
-        by: str | Sequence[str] = (),
-        at: Held | None = None,
-        units: str | None = None,
-        language: str | None = None,
-        view: str = "curves",
-        case: int | None = None,
-        **settings: Any,
-    ) -> Path:
-        """Write curves, or what else has a picture, to a file: .svg, .png or .pdf.
-
-        Parameters
-        ----------
-        file : str or path
-        x, y, by, at : optional
-            As for `curves`, or as the ``view`` has them.
-        units : str, optional
-            Such as "rpm, mm", or "typed"; by default SI. Views of a case are in SI.
-        language : str, optional
-            A code such as "uk"; English without it.
-        view : str
-            Name of the view as in its address: "map", "front", "ribbon", of a case "branch" and so on.
-        case : int, optional
-            Number of the case, for a view of a case.
-        settings
-            Further settings of the view, by their names in its address: ``z="efficiency"``, ``along="shaft.load"``.
-        """
-        path = Path(file)
-        asked = {"x": x, "y": y, "by": by, "at": at, "units": units, "language": language, **settings}
-        query = query_of({**asked, "format": path.suffix[1:].lower()})
-        path.write_bytes(self._client.read(self._address(view, case), query))
-        return path
-
     def plot(
         self,
         x: str | None = None,
@@ -236,12 +198,42 @@ class StudyTables(StudyPart):
         language: str | None = None,
         view: str = "curves",
         case: int | None = None,
+        file: str | PathLike[str] | None = None,
         **settings: Any,
     ) -> Picture:
-        """Curves, or what else has a picture, as one that notebooks show; arguments as for `picture`."""
+        """Curves, or what else has a picture, as one that notebooks show, and as a file.
+
+        Parameters
+        ----------
+        x, y, by, at : optional
+            As for `curves`, or as the ``view`` has them.
+        units : str, optional
+            Such as "rpm, mm", or "typed"; by default SI. Views of a case are in SI.
+        language : str, optional
+            A code such as "uk"; English without it.
+        view : str
+            Name of the view as in its address: "map", "front", "ribbon", of a case "branch" and so on.
+        case : int, optional
+            Number of the case, for a view of a case.
+        file : str or path, optional
+            File to write: .svg, .png or .pdf.
+        settings
+            Further settings of the view, by their names in its address: ``z="efficiency"``, ``along="shaft.load"``.
+        """
+        form = "svg" if file is None else Path(file).suffix[1:].lower()
         asked = {"x": x, "y": y, "by": by, "at": at, "units": units, "language": language, **settings}
-        query = query_of({**asked, "format": "svg"})
-        return Picture(self._client.read(self._address(view, case), query))
+        content = self._client.read(self._address(view, case), query_of({**asked, "format": form}))
+        picture = Picture(content, form)
+        if file is not None:
+            picture.save(file)
+        return picture
+
+    def picture(
+        self, file: str | PathLike[str], x: str | None = None, y: str | Sequence[str] = (), **settings: Any
+    ) -> Path:
+        """Write what `plot` gives to a file, whose path is returned."""
+        self.plot(x, y, file=file, **settings)
+        return Path(file)
 
     def _address(self, view: str, case: int | None) -> str:
         return f"{self._path}/{view}" if case is None else case_path(self.id, case, f"/{view}")

@@ -212,6 +212,13 @@ def test_what_a_study_gives_is_printed_in_short(run: sprag.Study) -> None:
 def test_any_view_can_be_a_picture(run: sprag.Study, tmp_path: Path) -> None:
     assert b"<svg" in run.plot(LOAD, SPEED, view="curves", units="rpm", language="uk").svg
     assert run.picture(tmp_path / "a.png", view="strobes", case=1).read_bytes().startswith(b"\x89PNG")
+    plotted = run.plot(view="strobes", case=1, file=tmp_path / "b.png")
+    assert plotted.content == (tmp_path / "b.png").read_bytes() == (tmp_path / "a.png").read_bytes()
+    assert (plotted._repr_png_(), plotted._repr_svg_()) == (plotted.content, None)
+    with pytest.raises(ValueError, match="as `file` of `plot`"):
+        run.plot(LOAD, SPEED).save(tmp_path / "c.png")
+    assert not (tmp_path / "c.png").exists()
+    run.plot(LOAD, SPEED).save(tmp_path / "c.svg")
     with pytest.raises(RefusedError):
         run.plot(view="front")
 
@@ -252,6 +259,8 @@ def test_a_preset_is_named_and_a_file_of_that_name_comes_first(tmp_path: Path, m
     assert spec_of("one_pendulum") == {"sprag": 1}
     with pytest.raises(sprag.SpecFileError, match="two_pendulums"):
         sprag.preset("two_pendulum")
+    with pytest.raises(sprag.SpecFileError, match="a study that comes with Sprag is called 'two_pendulums'"):
+        sprag.Drive.of("two_pendulum")
 
 
 def test_studies_are_compared_wherever_they_were_run(run: sprag.Study, pair: tuple[Study, Study]) -> None:
