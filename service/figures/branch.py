@@ -11,6 +11,7 @@ from sprag_study.sentences import Amount
 from sprag_study.service.figures.figure import PALETTE, Figure, Line, Panel, Quantity
 from sprag_study.service.figures.sections import parameter_of
 from sprag_study.service.reading.reader import Phrase, joined, plural, term
+from sprag_study.worker.models.vocabulary import ordinal
 
 if TYPE_CHECKING:
     from sprag_study.worker.arrays import Bools, Floats, Ints
@@ -122,9 +123,9 @@ def special_text(special: SpecialPoint, unit: str) -> str:
 
 
 def _part_text(part: str) -> Phrase:
-    """What a part of the machine is called: ``pendulum 0`` of ``pendulums.0``."""
+    """What a part of the machine is called: ``pendulum 1`` of ``pendulums.0``."""
     kind, _, number = part.rpartition("s.")
-    return Phrase("{part} {number}", part=Phrase(kind), number=number) if kind else Phrase(part)
+    return Phrase("{part} {number}", part=Phrase(kind), number=ordinal(number)) if kind else Phrase(part)
 
 
 def _below(made: CaseBranch) -> str:

@@ -10,6 +10,7 @@ from sprag_study.service.figures.figure import Figure, Line, Panel, Quantity, co
 from sprag_study.service.reading.reader import Phrase
 from sprag_study.service.reading.units import QuantityError, parse_quantity
 from sprag_study.worker import models
+from sprag_study.worker.models.vocabulary import ordinal
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -55,7 +56,7 @@ def _clutches(study: Study, spec: Mapping[str, Any]) -> Iterator[tuple[str, Any,
     for index, pendulum in enumerate(pendulums):
         prefix = f"pendulums.{index}.clutch."
         if f"{prefix}coefficients.0" in study.base:
-            yield prefix, pendulum.get("clutch"), Phrase("Clutch of pendulum {index}", index=index)
+            yield prefix, pendulum.get("clutch"), Phrase("Clutch of pendulum {index}", index=ordinal(index))
 
 
 def _coefficients(study: Study, prefix: str) -> Sequence[float]:

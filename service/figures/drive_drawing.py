@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from sprag_study.service.figures.drawing import Dimension, Drawing
 from sprag_study.service.languages import gettext
+from sprag_study.worker.models.vocabulary import ordinal
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -79,7 +80,11 @@ def _drawing(base: Mapping[str, float], number: int, several: bool, *, first: bo
             Dimension("shaft.inertia", "", _AXIS + 9, y + 9, "right", (_WHEEL - 6, 17.0), on="base"),
             Dimension("shaft.load", "", _AXIS + 36, y + 26, "right"),
         ]
-    title = gettext("Pendulum {number}", number=number) if several else gettext("Pendulum, freewheel clutch and shaft")
+    title = (
+        gettext("Pendulum {number}", number=ordinal(number))
+        if several
+        else gettext("Pendulum, freewheel clutch and shaft")
+    )
     about = gettext("Drawing of the drive: a pendulum on a vibrating axis drives the shaft through a freewheel clutch")
     return Drawing(title, about, _WIDTH, round(height, 1), "".join(shapes), tuple(dimensions))
 

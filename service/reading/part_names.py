@@ -6,6 +6,7 @@ from typing import Final
 
 from sprag_study.service.languages import N_, _, gettext
 from sprag_study.service.reading.wording import words
+from sprag_study.worker.models.vocabulary import ordinal
 
 #: What parts of a machine are called that have a number.
 NUMBERED: Final = {
@@ -28,14 +29,14 @@ RUN_LABELS: Final = {
 
 
 def part_name(path: str) -> str:
-    """What a part of a machine, or of a spec, is called: ``Pendulum 0, clutch``."""
+    """What a part of a machine, or of a spec, is called: ``Pendulum 1, clutch``."""
     if not path:
         return _("General")
     names: list[str] = []
     for name in path.split("."):
         if name.isdigit():
             text = NUMBERED.get(names.pop(), N_("No. {number}"))
-            names.append(_(text, number=name))
+            names.append(_(text, number=ordinal(name)))
         else:
             names.append(name)
     said = [gettext(words(name)) if name.islower() else name for name in names]

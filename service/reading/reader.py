@@ -85,7 +85,7 @@ def model_title(model: str) -> str:
 
 
 def part_label(label: str) -> Phrase:
-    """What a line of one part of a machine is called: ``Pendulum 0``, ``Shaft``."""
+    """What a line of one part of a machine is called: ``Pendulum 1``, ``Shaft``."""
     if isinstance(label, Phrase):
         return label
     word, _, number_of_part = label.rpartition(" ")
@@ -208,7 +208,7 @@ class Reading:
         return self.say(text) if known else earlier_warning(text, getattr(text, "code", ""), self)
 
     def place(self, place: Place) -> str:
-        """What a place of a spec is called: ``Spring rate, pendulum 0``; ``Run, at most``.
+        """What a place of a spec is called: ``Spring rate, pendulum 1``; ``Run, at most``.
 
         Where it is about a path or a result, that is what it is called by.
         """

@@ -17,6 +17,7 @@ from sprag_study.service.results.varied import formula_text, values_text
 from sprag_study.service.spec.described import ANY_RUN, DURATION, SETTLED_RUN
 from sprag_study.service.spec.machine.shaft import MEAN_SPEED_IS
 from sprag_study.worker.models.parameters import parameter_of
+from sprag_study.worker.models.vocabulary import ordinal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -55,11 +56,11 @@ def varying(study: Study, spec: Mapping[str, Any], reading: Reading) -> tuple[li
 
 
 def choice_name(item: Input) -> str:
-    """What a choice of the machine is called: ``How the resistance is given, part 0``."""
+    """What a choice of the machine is called: ``How the resistance is given, part 1``."""
     text = _(item.description) if item.description else _(words(item.path))
     text = text[:1].upper() + text[1:]
     numbered = _NUMBER.match(item.path)
-    return f"{text}, {lower_first(_(NUMBERED[numbered[1]], number=numbered[2]))}" if numbered else text
+    return f"{text}, {lower_first(_(NUMBERED[numbered[1]], number=ordinal(numbered[2])))}" if numbered else text
 
 
 def in_words(item: Input) -> float | str | None:

@@ -141,7 +141,7 @@ def in_captions(text: str, names: Container[str], reading: Reading) -> str:
 
 
 def formula_text(item: Input, reading: Reading) -> str:
-    """The formula of a derived parameter as it was written: ``1.1 · (arm of the mass, pendulum 0)² + 5·10⁻⁴ kg·m²``.
+    """The formula of a derived parameter as it was written: ``1.1 · (arm of the mass, pendulum 1)² + 5·10⁻⁴ kg·m²``.
 
     Its quantities keep their units. By code names it is the formula that can be typed.
     """

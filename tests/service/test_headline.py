@@ -221,9 +221,9 @@ def test_the_only_pendulum_of_a_machine_is_not_named() -> None:
     paths = ["pendulums.0.arm", "pendulums.0.spring_rate", "shaft.load"]
     reading = Reading("vibration-drive", single=single_parts(paths))
     assert KeyNumber("pendulums.0.spring_rate", 31.5).title(reading) == "Spring rate"
-    assert reading.caption("pendulums.0.power.loss") == reading.caption("power.loss.mean") + ", pendulum 0"
+    assert reading.caption("pendulums.0.power.loss") == reading.caption("power.loss.mean") + ", pendulum 1"
     several = Reading("vibration-drive", single=single_parts([*paths, "pendulums.1.arm"]))
-    assert several.caption("pendulums.0.spring_rate") == "Spring rate, pendulum 0"
+    assert several.caption("pendulums.0.spring_rate") == "Spring rate, pendulum 1"
     assert reading.letter("shaft.irregularity") == "<i>δ</i><sub>ω</sub>"  # δ is the backlash in drawings
 
 

@@ -239,7 +239,7 @@ def test_its_machine_is_computed_while_it_is_drawn(service: Service) -> None:
 
 def test_a_new_parameter_of_a_drive_is_in_the_form_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     drive, before = model_of(FORM_MODEL), names_by_title(FORM_MODEL)
-    titles = ["Vibration of the base", "Pendulum 0", "Freewheel clutch", "Output shaft", "Surroundings"]
+    titles = ["Vibration of the base", "Pendulum 1", "Freewheel clutch", "Output shaft", "Surroundings"]
     assert list(before) == titles
     new = tuple(Parameter(p, "x", "1", 0.0, 9.0, False, 0.0, "new") for p in ("shaft.drag", "housing.mass", "pressure"))
     more = (*drive.parameters(), *new)

@@ -123,7 +123,6 @@ class Rows:
     add: str
     drop: str
     blocks: tuple[Block, ...]
-    first: int = 1
     only_last: bool = False
     copies: bool = True
     alone: bool = False

@@ -138,7 +138,8 @@ class Presentation:
     portrait : description of the phase portrait; "" where there is none
     motion, motion_note : short description of the plots, and a note for the reader
     symbols : symbol of the catalogue -> base and index as in print
-    captions : what people read instead of a name of the catalogue, with N and K for indices; ``{}`` is the last index
+    captions : what people read instead of a name of the catalogue, with N and K for indices; ``{}`` is the last
+        index, ``{number}`` the same for people, who count from 1
     letters : base and index, as in print, of results
     form : its machine as fields of a form
     laboratory : what its machine answers while it is drawn

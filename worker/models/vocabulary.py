@@ -23,15 +23,20 @@ _OF_DESIGNS: Final = ("rank", "violation", "miss")
 _END: Final = re.compile(r"[;,:(]| / ")
 
 
+def ordinal(index: str | int) -> str:
+    """The number of one of several for people, who count from 1 where paths count from 0; other texts stay."""
+    return str(int(index) + 1) if str(index).isdigit() else str(index)
+
+
 def words(name: str) -> str:
     """A name without a caption as words: ``output.level`` as ``Output level``."""
     text = name.replace(".", " ").replace("_", " ").strip()
-    text = re.sub(r"^pendulums (\d+)", r"pendulum \1", text)
+    text = re.sub(r"^pendulums (\d+)", lambda found: f"pendulum {ordinal(found[1])}", text)
     return text[:1].upper() + text[1:] if text[:1].isascii() else text
 
 
 def caption(model: str, name: str, translate: Callable[[str], str] = str, single: Collection[str] = ()) -> str:
-    """The caption of a path of a spec, a result or a variable of ``model``: ``Spring rate, pendulum 0``.
+    """The caption of a path of a spec, a result or a variable of ``model``: ``Spring rate, pendulum 1``.
 
     Without one of its own, a parameter has the beginning of its description, anything else its name in words.
     ``translate`` gives each text of `caption_texts` in another language. ``single`` are the numbered parts of which
@@ -42,13 +47,14 @@ def caption(model: str, name: str, translate: Callable[[str], str] = str, single
     text, index, part = _caption(model, name)
     if part and part[1] == "0" and part[0] in single and text not in _without_part(model):
         part = None
-    return translate(text).format(index) + (f", {translate(part[0])} {part[1]}" if part else "")
+    whose = f", {translate(part[0])} {ordinal(part[1])}" if part else ""
+    return translate(text).format(index, number=ordinal(index)) + whose
 
 
 def bare_caption(model: str, name: str, translate: Callable[[str], str] = str) -> str:
     """The caption without its part of the machine, for places that stand within that part: ``Spring rate``."""
     text, index, _part = _caption(model, name)
-    return translate(text).format(index)
+    return translate(text).format(index, number=ordinal(index))
 
 
 def single_parts(paths: Iterable[str]) -> frozenset[str]:
@@ -69,7 +75,7 @@ def has_caption(model: str, name: str) -> bool:
 
 @lru_cache(maxsize=4096)
 def _caption(model: str, name: str) -> tuple[str, str, tuple[str, str] | None]:
-    """The text, the number for its ``{}``, and word and number of the part that it belongs to."""
+    """The text, its last index, and word and index of the part that it belongs to."""
     own, part = _within_part(name)
     captions = model_of(model).presentation.captions
     general = general_path(name)

@@ -23,6 +23,7 @@ from sprag_study.worker.models import (
     parameter_catalogue,
 )
 from sprag_study.worker.models.parameters import placed
+from sprag_study.worker.models.vocabulary import ordinal
 
 if TYPE_CHECKING:
     from sprag_study.worker.models import ClutchFit
@@ -199,7 +200,7 @@ def _read_clutches(base: Node, machine: Drive) -> None:
             shared = [] if backlash is None else [backlash]
             _add(machine, read_clutch(pendulum["clutch"], f"{_PENDULUMS}.{index}.clutch.", shared))
         elif not node.given:
-            message = Sentence("is required, since pendulum {number} has its own", number=str(own[0]))
+            message = Sentence("is required, since pendulum {number} has its own", number=ordinal(own[0]))
             pendulum["clutch"].refuse("required", message, allowed=allowed)
 
 

@@ -61,7 +61,7 @@ def test_a_motion_is_drawn_over_its_states_and_as_a_portrait() -> None:
     (orbit,) = phase_figure(made, shown).panels[0].lines
     with languages.language("uk"):
         portrait = portrait_figure(models.Portrait("", 1, made, made, 1, "ok"), shown)
-        assert {shown_text(line.name) for line in portrait.panels[0].lines} >= {"Маятник 0"}
+        assert {shown_text(line.name) for line in portrait.panels[0].lines} >= {"Маятник 1"}
         assert {shown_text(line.name) for line in portrait.panels[1].lines} >= {"Вал"}
     assert (orbit.x.tolist(), orbit.y.tolist(), orbit.colour) == ([0.0, 8.0, 16.0], [1.0, 9.0, 17.0], PALETTE[0])
 

@@ -114,7 +114,7 @@ def test_inputs_are_named_by_the_model_that_has_them_and_read_as_its_study_typed
     assert found["Model"] == ["Vibration drive", "Machine shaft"]
     assert found["Inertia of the drive"] == ["–", "13 values from 5 to 80 kg·m², unequal"]
     assert found["Length of the crank"] == ["–", "100 mm"]
-    assert found["Beginning of step 0"] == ["–", "120 deg"]
+    assert found["Beginning of step 1"] == ["–", "120 deg"]
     assert found["Mass"] == ["0.5 kg", "–"]
     assert found["Each case runs"] == ["until its motion is settled", "–"]
     assert found["Excitation frequency"] == ["20 to 35 Hz, 16 values", "–"]

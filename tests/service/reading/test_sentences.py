@@ -30,6 +30,7 @@ from sprag_study.service.faults import FaultError, WarningCode
 from sprag_study.service.http.problems import as_api_error
 from sprag_study.service.languages import language
 from sprag_study.service.languages.recorded import MANY_STUDIES, NOT_IN_TIME
+from sprag_study.service.reading.part_names import part_name
 from sprag_study.service.reading.quantities import Units
 from sprag_study.service.reading.reader import Phrase, Reading, shown, shown_stored
 from sprag_study.service.storage.errors import StudyNotFoundError
@@ -170,3 +171,11 @@ def test_a_problem_is_a_sentence_in_every_language(error: Exception, english: st
 
 def test_greek_letters_are_symbols_in_titles() -> None:
     assert [DRIVE.say_name(Phrase(text)) for text in ("μ*", "share", "зсув")] == ["μ*", "Share", "Зсув"]
+
+
+def test_people_count_parts_from_1() -> None:
+    assert SHAFT.caption("drive.stages.1.ratio") == "Ratio, stage 2"
+    assert SHAFT.caption("operation.steps.0.value") == "Resistance in step 1"
+    assert DRIVE.caption("pendulums.0.mass").endswith(", pendulum 1")
+    assert DRIVE.caption("clutch.coefficients.1") == "Clutch coefficient of degree 1"
+    assert part_name("pendulums.0.clutch") == "Pendulum 1, clutch"

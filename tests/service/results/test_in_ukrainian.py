@@ -59,7 +59,7 @@ def test_braces_of_other_texts_are_no_places() -> None:
 
 def test_captions_are_made_of_translated_parts() -> None:
     with languages.language("uk"):
-        assert DRIVE.caption("pendulums.1.spring_rate") == "Жорсткість пружини, маятник 1"
+        assert DRIVE.caption("pendulums.1.spring_rate") == "Жорсткість пружини, маятник 2"
         assert DRIVE.caption("torque.mean.half_width") == "Середній момент муфт, півширина"
         assert SHAFT.caption("omega.harmonics.3") == "Гармоніка 3 швидкості"
         assert DRIVE.within("shaft.load") == "момент навантаження"
@@ -69,7 +69,7 @@ def test_captions_are_made_of_translated_parts() -> None:
         tied = "excitation.amplitude_x = excitation.amplitude_y"
         assert DRIVE.caption(tied) == "Горизонтальна амплітуда = вертикальна амплітуда"
     assert DRIVE.caption(tied) == "Horizontal amplitude = vertical amplitude"
-    assert DRIVE.caption("pendulums.1.spring_rate") == "Spring rate, pendulum 1"
+    assert DRIVE.caption("pendulums.1.spring_rate") == "Spring rate, pendulum 2"
 
 
 def test_words_of_codes_and_units() -> None:
@@ -104,9 +104,9 @@ def test_special_points_conditions_and_scales_are_in_words() -> None:
     (condition,) = read_conditions([ResultInfo("efficiency", "1", "")], ["efficiency >= 90 % of nominal"])
     strobes = Figure(Quantity("", "1"), (), scale=Phrase("excitation period"))
     assert condition.text == "efficiency ≥ 90 % of nominal"
-    assert special_text(grazing, "N*m") == "grazing at 0.25 N·m: pendulum 0 engaged 0 → 1"
+    assert special_text(grazing, "N*m") == "grazing at 0.25 N·m: pendulum 1 engaged 0 → 1"
     with languages.language("uk"):
-        assert DRIVE.say(special_text(grazing, "N*m")) == "дотик за 0,25 Н·м: маятник 0 зчеплена 0 → 1"
+        assert DRIVE.say(special_text(grazing, "N*m")) == "дотик за 0,25 Н·м: маятник 1 зчеплена 0 → 1"
         assert DRIVE.say(condition.text) == "ККД ≥ 90 % від номінального"
         assert read_figure(strobes, DRIVE).scale == "Період збудження"
 

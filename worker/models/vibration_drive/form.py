@@ -57,7 +57,7 @@ FORM: Final = Form(
                 Block("", (FormField("*"),)),
                 Block("Its clutch", (_CLUTCH,), within=True, only=("clutches", "own")),
             ),
-            first=0, only_last=True, shared=("clutches", "clutch"), every="every pendulum", one="pendulum {number}",
+            only_last=True, shared=("clutches", "clutch"), every="every pendulum", one="pendulum {number}",
         ),
         Block("Freewheel clutch", (_WHOSE,)),
         Block("Output shaft", (FormField("shaft/*"),)),

@@ -8,6 +8,7 @@ from sprag_study.worker.models.presentation import Answer, Clauses, Panel, Prese
 from sprag_study.worker.models.vibration_drive.form import FORM
 from sprag_study.worker.models.vibration_drive.laboratory import LABORATORY
 from sprag_study.worker.models.vibration_drive.words import CAPTIONS, LETTERS
+from sprag_study.worker.models.vocabulary import ordinal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,7 +20,7 @@ def _pendulums(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def _title(pendulum: str) -> str:
-    return f"Pendulum {pendulum.rpartition('.')[2]}"
+    return f"Pendulum {ordinal(pendulum.rpartition('.')[2])}"
 
 
 def _panels(names: Sequence[str], _: Sequence[str]) -> tuple[Panel, ...]:

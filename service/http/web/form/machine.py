@@ -192,7 +192,7 @@ class _Machine:
                 if block.only is None or self.values.get(f"{BASE}/{block.only[0]}") == block.only[1]:
                     own = self._block(block, place, () if made else rows.fields)
                     own = replace(own, part=place if rows.alone else "", heading=block.title)
-                    title = _(rows.title, number=index + rows.first, label=_(block.title).lower())
+                    title = _(rows.title, number=index + 1, label=_(block.title).lower())
                     if block.within:
                         made[-1] = replace(made[-1], within=(*made[-1].within, own))
                     else:
@@ -333,7 +333,7 @@ def row_of(model: str, path: str) -> tuple[data.Rows | None, int, str]:
     for rows in models.model_of(model).presentation.form.lists:
         found = re.fullmatch(rf"{re.escape(rows.at)}\.(\d+)\.(.*)", path) if rows.alone else None
         if found is not None:
-            return rows, int(found[1]) + rows.first, found[2]
+            return rows, int(found[1]) + 1, found[2]
     return None, 0, path
 
 

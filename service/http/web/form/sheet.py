@@ -308,7 +308,7 @@ def _described(blocks: Sequence[Block], spots: Mapping[str, Spot], values: Mappi
     kind, *others = chosen.items()
     at, _slash, index = blocks[0].part.rpartition("/")
     rows = next(rows for rows in form_of(values).lists if at == f"{BASE}/{rows.at}")
-    title = _(rows.title, number=int(index) + rows.first, label=lower_first(kind[1]))
+    title = _(rows.title, number=int(index) + 1, label=lower_first(kind[1]))
     before = [spots[entry.name] for entry in blocks[0].entries if entry.item in rows.fields]
     texts = [f"{lower_first(_(label))}: {lower_first(text)}" for label, text in others]
     texts += [f"{lower_first(spot.label)} {_numeral(spot.quantity.texts[0])} {unit_text(spot.quantity.unit)}"

@@ -123,7 +123,7 @@ def test_everything_works_without_javascript(visitor: Visitor, example: str) -> 
     page = visitor.page
     page.goto("/new?preset=one_pendulum")
     page.get_by_role("button", name="Add a pendulum").click()
-    expect(page.locator("figcaption", has_text="Pendulum 1")).to_be_visible()
+    expect(page.locator("figcaption", has_text="Pendulum 2")).to_be_visible()
     page.get_by_role("button", name="Remove the last one").click()
     for _ in range(2):
         page.get_by_role("button", name="Remove", exact=True).first.click()

@@ -124,14 +124,14 @@ def test_the_drawing_of_a_best_design_has_its_operating_points(service: Service)
 
 def test_a_name_that_ends_with_a_number_is_apart_from_its_value(service: Service) -> None:
     study_id = computed(service, preset("slotter"))
-    assert "Curve: resistance in step 0 = 4000 N" in page(service, f"/studies/{study_id}")
+    assert "Curve: resistance in step 1 = 4000 N" in page(service, f"/studies/{study_id}")
 
 
 def test_the_form_speaks_of_steps_and_of_means_in_words(service: Service) -> None:
     text = page(service, "/new?preset=slotter")
     assert "Mean speed means" in text
     assert "middle of largest and smallest" in text
-    assert "Resistance in step 0" in text
+    assert "Resistance in step 1" in text
     assert "Steps 0" not in text
     assert "quick return (whitworth)" in text.lower()
 

@@ -71,7 +71,7 @@ def test_what_scatters_around_no_share_is_no_interaction(monkeypatch: pytest.Mon
 
 
 def test_shares_are_told_apart_from_the_numbers_of_parts() -> None:
-    """Captions end with numbers of parts: ``backlash, pendulum 0``."""
+    """Captions end with numbers of parts: ``backlash, pendulum 1``."""
     known = causes.Causes((Share(0.5, 0.04), Share(0.3, 0.02), Share(0.2, 0.01)), 0.0)
     (sentence,) = causes_sentences(parse_spec(SPEC).study, known, "speed")
     assert sentence.endswith(": first (50.0 ± 4.0 %); second (30.0 ± 2.0 %); third (20.0 ± 1.0 %).")
