@@ -61,6 +61,10 @@ class _Advance:
         self.add(row("u"), self.over([code.let("v", f"{w[k]} - {self.shaft[k]}") for k in range(order)]))
         phi_end = code.let("phi_end", horner(angle, self.x))
         w_end = code.let("w_end", horner(w, self.x))
+        if self.layout.drag:
+            relative = [code.let("V", f"{w[k]} - {self.shaft[k]}") for k in range(order + 1)]
+            lost = self.over([code.let("K", square(relative, k)) for k in range(order + 1)])
+            self.add(row("work_clutch"), f"{code.row(row('rate'))}*{lost}")
         code.store(row("phi"), phi_end)
         code.store(row("speed"), w_end)
         self.require(f"abs({phi_end}) < {ANGLE_BOUND!r}")

@@ -35,6 +35,7 @@ class Quantity(StrEnum):
     RELATIVE_SPEED = "w = phi' - phi_e'"
     WINDUP = "u = xi - delta"
     LOCK_TORQUE = "torque that keeps w = 0"
+    CLUTCH_TORQUE = "torque T of the clutch"
     TOTAL_TORQUE = "sum of clutch torques"
     SHAFT_SPEED = "phi_e'"
 
@@ -46,6 +47,8 @@ class Threshold(IntEnum):
     DATA_END = 2
     FIRST_COEFFICIENT = 3
     LOAD = 4
+    #: 0 of a clutch with damping; one without it has no such guard.
+    ZERO_IF_DAMPED = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,9 +79,15 @@ TRANSITIONS: tuple[Transition, ...] = (
     Transition(Clutch.ENGAGED, Quantity.WINDUP, +1, Threshold.DATA_END, Clutch.BEYOND, "u = u_end"),
     Transition(Clutch.ENGAGED, Quantity.RELATIVE_SPEED, -1, Threshold.ZERO, Clutch.ENGAGED, "w = 0", True),
     Transition(Clutch.ENGAGED, Quantity.RELATIVE_SPEED, +1, Threshold.ZERO, Clutch.START, "xi = 0, energy lost", True),
+    Transition(
+        Clutch.ENGAGED, Quantity.CLUTCH_TORQUE, -1, Threshold.ZERO_IF_DAMPED, Clutch.FREE, "T = 0, energy Pi(u) lost"
+    ),
     Transition(Clutch.BEYOND, Quantity.WINDUP, -1, Threshold.DATA_END, Clutch.ENGAGED, "u = u_end"),
     Transition(Clutch.BEYOND, Quantity.RELATIVE_SPEED, -1, Threshold.ZERO, Clutch.BEYOND, "w = 0", True),
     Transition(Clutch.BEYOND, Quantity.RELATIVE_SPEED, +1, Threshold.ZERO, Clutch.START, "xi = 0, energy lost", True),
+    Transition(
+        Clutch.BEYOND, Quantity.CLUTCH_TORQUE, -1, Threshold.ZERO_IF_DAMPED, Clutch.FREE, "T = 0, energy Pi(u) lost"
+    ),
     Transition(Clutch.LOCKED, Quantity.LOCK_TORQUE, +1, Threshold.FIRST_COEFFICIENT, Clutch.ENGAGED, "u = 0, w = 0"),
     Transition(Clutch.LOCKED, Quantity.LOCK_TORQUE, -1, Threshold.ZERO, Clutch.FREE, "w = 0"),
     Transition(Shaft.HELD, Quantity.TOTAL_TORQUE, +1, Threshold.LOAD, Shaft.ROTATING, "phi_e' = 0"),
@@ -103,6 +112,7 @@ _EDGES = {
     (Quantity.WINDUP, -1): Band.U_LOW,
     (Quantity.WINDUP, +1): Band.U_HIGH,
     (Quantity.LOCK_TORQUE, -1): Band.T_LOW,
+    (Quantity.CLUTCH_TORQUE, -1): Band.T_LOW,
     (Quantity.LOCK_TORQUE, +1): Band.T_HIGH,
 }
 

@@ -95,13 +95,14 @@ class _Watch:
         self.guard(bounds, edges, row("t_low"), row("t_high"))
         self.peak(bounds, block, row("torque_max"))
         force = code.series("e", row("force"), layout.coefficients)
-        self._check_law(torque, force, windup.end, row("locked"), row("allowed"))
+        damping = f" + {code.row(row('rate'))}*({' + '.join(relative)})" if layout.drag else ""
+        self._check_law(torque, f"{horner(force, windup.end)}{damping}", row("locked"), row("allowed"))
         angle = primitive_span(code, "phi", code.load("phi", row("phi")), w[:-1], self.h)
         self.peak(angle, block, row("phi_max"), row("phi_min"))
         self.peak(span(code, "w", w), block, row("speed_max"), row("speed_min"))
         self.peak(rate_span(code, "a", w, self.inverse_h), block, row("acc_max"), row("acc_min"))
 
-    def _check_law(self, torque: list[Term], force: list[Term], u_end: str, locked: int, allowed: int) -> None:
+    def _check_law(self, torque: list[Term], law: str, locked: int, allowed: int) -> None:
         """Lower the margin where the step is too long for the clutch's law.
 
         The step is chosen by two coefficients. A law without a linear term, entered from uniform motion, has a series
@@ -110,7 +111,7 @@ class _Watch:
         """
         code = self.code
         end = code.let("torque_end", " + ".join(torque))
-        defect = code.let("defect", f"abs({horner(force, u_end)} - {end})*(1.0 - {code.row(locked)})")
+        defect = code.let("defect", f"abs({law} - {end})*(1.0 - {code.row(locked)})")
         most = code.let("most", f"{code.row(allowed)} + {_TORQUE_ROUNDING!r}*abs({end})")
         self.margin = code.let("margin", f"{self.margin} if {defect} <= {most} else {TOO_LONG!r}")
 

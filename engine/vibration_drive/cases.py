@@ -33,7 +33,8 @@ class Column(IntEnum):
 
 
 class PendulumColumn(IntEnum):
-    """Columns that each pendulum has, before its clutch coefficients; those up to LIMIT as the layout has them."""
+    """Columns that each pendulum has, before its clutch coefficients; the first ones, up to OVERRUNNING_DAMPING, as
+    the layout has them."""
 
     ML = 0
     SPRING = auto()
@@ -42,6 +43,8 @@ class PendulumColumn(IntEnum):
     INERTIA = auto()
     BACKLASH = auto()
     LIMIT = auto()
+    CLUTCH_DAMPING = auto()
+    OVERRUNNING_DAMPING = auto()
     ANGLE = auto()
     SPEED = auto()
     WINDUP = auto()
@@ -105,11 +108,19 @@ def has_drag(paths: Iterable[str]) -> bool:
     return any(path.rpartition(".")[2] in DRAG for path in paths)
 
 
-def unloaded(matrix: Floats) -> NDArray[np.bool_]:
+def unloaded(matrix: Floats, pendulums: int) -> NDArray[np.bool_]:
     """Whether nothing resists the shaft of each case of a matrix, so that every speed that no clutch changes lasts."""
     resisting = [Column.LOAD, Column.BEARING, Column.LINEAR, Column.QUADRATIC]
-    free: NDArray[np.bool_] = np.all(matrix[:, resisting] == 0.0, axis=1)
+    free: NDArray[np.bool_] = np.all(matrix[:, resisting] == 0.0, axis=1) & ~has_backstop(matrix, pendulums)
     return free
+
+
+def has_backstop(matrix: Floats, pendulums: int) -> NDArray[np.bool_]:
+    """Whether the drive of each case of a matrix has a backstop, as one with drag in an overrunning clutch does."""
+    width = (matrix.shape[1] - stop_column(STOPS)) // pendulums
+    drags = matrix[:, stop_column(STOPS) + PendulumColumn.OVERRUNNING_DAMPING :: width]
+    backstop: NDArray[np.bool_] = np.any(drags > 0.0, axis=1)
+    return backstop
 
 
 def _stop(time: Floats) -> tuple[Floats, Floats]:
@@ -135,8 +146,8 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
     -------
     array, shape (cases, columns)
         `Column`: nu, period, d nu^2, b nu^2, chi, g, M_c, lambda_e, k_1, k_2, J_e, 1/rate, initial speed, step budget;
-        four stops; per pendulum `PendulumColumn`: M l/J, c a^2/J, lambda/J, 1/J, J, delta, u_end, initial angle, speed,
-        windup and state of the clutch; its clutch coefficients.
+        four stops; per pendulum `PendulumColumn`: M l/J, c a^2/J, lambda/J, 1/J, J, delta, u_end, lambda_k, lambda_o,
+        initial angle, speed, windup and state of the clutch; its clutch coefficients.
     """
     n, count = pendulum_count(columns), coefficient_count(columns)
 
@@ -164,7 +175,7 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
             name: parameter(f"pendulums.{i}.{name}")
             for name in (
                 "inertia", "mass", "arm", "spring_rate", "spring_arm", "damping", "backlash", "initial_angle",
-                "initial_speed", "initial_windup", "initial_clutch",
+                "initial_speed", "initial_windup", "initial_clutch", "clutch_damping", "overrunning_damping",
             )
         }  # fmt: skip
         inertia = own["inertia"]
@@ -180,6 +191,7 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
             P.ML: moment, P.SPRING: spring, P.DAMPING: own["damping"] / inertia,
             P.INVERSE_INERTIA: 1.0 / inertia, P.INERTIA: inertia, P.BACKLASH: own["backlash"],
             P.LIMIT: column(f"{law}windup_limit", math.inf), P.ANGLE: own["initial_angle"],
+            P.CLUTCH_DAMPING: own["clutch_damping"], P.OVERRUNNING_DAMPING: own["overrunning_damping"],
             P.SPEED: own["initial_speed"], P.WINDUP: own["initial_windup"], P.CLUTCH: own["initial_clutch"],
         }  # fmt: skip
         pendulums += [values[place] for place in P]

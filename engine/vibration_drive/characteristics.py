@@ -3,7 +3,13 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag_study.engine.vibration_drive.cases import Column, PendulumColumn, pendulum_column, stop_column
+from sprag_study.engine.vibration_drive.cases import (
+    Column,
+    PendulumColumn,
+    has_backstop,
+    pendulum_column,
+    stop_column,
+)
 from sprag_study.engine.vibration_drive.layout import OUT_EVENTS, OUT_RUNUP, OUT_STEPS, OUT_SUMS, Layout
 from sprag_study.engine.vibration_drive.regimes import keeps_windup
 from sprag_study.engine.vibration_drive.results import result_infos
@@ -183,6 +189,7 @@ def _pendulum(cases: _Cases, i: int, out: dict[str, Floats]) -> None:
     put("fraction.beyond_data", cases.pendulum(i, "time_beyond") / cases.time)
     put("engagements", cases.pendulum(i, "engagements"))
     put("power.input", cases.parameter(i, PendulumColumn.ML) * inertia * cases.pendulum(i, "work_input") / cases.length)
+    put("power.clutch_loss", cases.pendulum(i, "work_clutch") / cases.length)
     put(
         "power.loss",
         cases.parameter(i, PendulumColumn.DAMPING) * inertia * cases.pendulum(i, "work_loss") / cases.length,
@@ -204,7 +211,8 @@ def _shaft(cases: _Cases, out: dict[str, Floats]) -> None:
     out["shaft.speed.max"] = cases.shaft("speed_max")
     # Under a load the shaft never turns back: a negative minimum is a rounding error at the instant it stops.
     lowest = cases.shaft("speed_min")
-    out["shaft.speed.min"] = np.where((cases.load > 0.0) & (lowest < 0.0), 0.0, lowest)
+    stops = (cases.load > 0.0) | has_backstop(cases.matrix, cases.lay.n)
+    out["shaft.speed.min"] = np.where(stops & (lowest < 0.0), 0.0, lowest)
     out["shaft.irregularity"] = _ratio(cases.shaft("speed_max") - out["shaft.speed.min"], mean)
     out["shaft.turn"] = turn
     out["shaft.acceleration.max"] = cases.shaft("acc_max")
@@ -219,7 +227,8 @@ def _shaft(cases: _Cases, out: dict[str, Floats]) -> None:
     out["power.clutch.mean"] = cases.shaft("work_clutch") / cases.length
     out["power.clutch.max"] = cases.shaft("power_max")
     out["power.input.mean"] = _over_pendulums(cases, out, "power.input")
-    out["power.loss.mean"] = _over_pendulums(cases, out, "power.loss") + out["power.bearing.mean"]
+    clutches = _over_pendulums(cases, out, "power.clutch_loss")
+    out["power.loss.mean"] = _over_pendulums(cases, out, "power.loss") + (out["power.bearing.mean"] + clutches)
     out["power.stored.mean"] = (cases.shaft("energy_2") - cases.shaft("energy_0")) / cases.length
     useful = cases.work_against_load(
         cases.shaft("turn_2") - cases.shaft("turn_1"),

@@ -14,7 +14,7 @@ from sprag_study.engine.endings import ENDINGS, Ending
 from sprag_study.engine.outcome import Engagement, Engagements, PeriodMeans
 from sprag_study.engine.run import Run, SettledRun
 from sprag_study.engine.vibration_drive.automaton import Clutch
-from sprag_study.engine.vibration_drive.cases import Column, case_matrix, unloaded, with_lengths
+from sprag_study.engine.vibration_drive.cases import Column, case_matrix, pendulum_count, unloaded, with_lengths
 from sprag_study.engine.vibration_drive.integration import integrate
 from sprag_study.engine.vibration_drive.kernel import Kernel, kernel_of
 from sprag_study.engine.vibration_drive.layout import OUT_ENDING
@@ -106,7 +106,7 @@ def settled_engagements(
     repeats = regime.repeats
     turn = int(found.orders[0]) if repeats else settings.max_period
     name = regime.name.lower()
-    free = bool(unloaded(case_matrix(columns, settings.run, 1))[0])
+    free = bool(unloaded(case_matrix(columns, settings.run, 1), pendulum_count(columns))[0])
     if ending != Ending.OK or (free and regime in (Regime.COASTING, Regime.HELD)):
         # In the limit of a vanishing load no clutch transmits torque.
         return Engagements(0.0, turn * period, name, (), (), ending)

@@ -6,10 +6,11 @@ by J:
 
     w' = (M l/J) (x'' cos phi + y'' sin phi + g sin phi) - (c a^2/J) phi - (lambda/J) w - T/J
     shaft' = (sum T - M_c - (lambda_e + k_1) shaft - k_2 shaft^2) / J_e
-    T = sum c_k u^(k-1)                 u' = w - shaft
+    T = sum c_k u^(k-1) + rate u'                  u' = w - shaft
 
 Modes enter as numbers, not branches: the law in force is zero where a clutch is free and a straight line beyond the
-data; the shaft's mobility is zero where it is held. A locked clutch has w' = shaft', and its torque follows from this.
+data, and the rate in force is the damping of an engaged or of an overrunning clutch; the shaft's mobility is zero where
+it is held. A locked clutch has w' = shaft', and its torque follows from this.
 """
 
 import math
@@ -44,7 +45,7 @@ class _Pendulum:
     def __init__(self, code: LaneCode, layout: Layout, index: int) -> None:
         self.index = index
         self.base = layout.pendulums + index * layout.stride
-        for name in ("ml", "spring", "damping", "inverse_inertia", "inertia", "locked"):
+        for name in ("ml", "spring", "damping", "inverse_inertia", "inertia", "locked", "rate"):
             setattr(self, name, code.load(f"{name}{index}", self.row(layout, name)))
         first = self.row(layout, "force")
         self.force = [code.load(f"e{index}_{k}", first + k) for k in range(layout.coefficients)]
@@ -66,6 +67,7 @@ class _Pendulum:
     inverse_inertia: Term
     inertia: Term
     locked: Term
+    rate: Term
 
     def row(self, layout: Layout, name: str) -> int:
         offset: int = getattr(layout, f"p_{name}")
@@ -88,8 +90,11 @@ def _excitation(code: LaneCode, layout: Layout) -> tuple[list[Term], list[Term]]
     return x, y
 
 
-def _torque(code: LaneCode, p: _Pendulum, k: int) -> Term:
-    """Coefficient k of the clutch torque (3) by Horner's scheme in u^2: c_1 + c_2 u + u^2 (c_3 + c_4 u + ...)."""
+def _torque(code: LaneCode, p: _Pendulum, k: int, damping: str) -> Term:
+    """Coefficient k of the clutch torque (3) by Horner's scheme in u^2: c_1 + c_2 u + u^2 (c_3 + c_4 u + ...).
+
+    ``damping`` is what is added to it.
+    """
     top, *lower = [p.force[j : j + 2] for j in reversed(range(0, len(p.force), 2))]
     value = _straight(top, p.u, k)
     if lower:
@@ -101,7 +106,7 @@ def _torque(code: LaneCode, p: _Pendulum, k: int) -> Term:
             p.levels[level].append(code.let(f"h{p.index}_{level}_{k}", value))
             higher = product(p.levels[level], p.squared, k)
         value = f"{_straight(pair, p.u, k)} + {higher}"
-    return code.let(f"T{p.index}_{k}", value)
+    return code.let(f"T{p.index}_{k}", f"{value}{damping}")
 
 
 def _straight(pair: list[Term], u: list[Term], k: int) -> str:
@@ -144,7 +149,8 @@ def series_loop(layout: Layout) -> str:
     linear, quadratic = (code.load(name, getattr(layout, name)) for name in ("linear", "quadratic"))
     for k in range(order + 1):
         for p in pendulums:
-            p.torque.append(_torque(code, p, k))
+            damping = f" + {p.rate}*({p.w[k]} - {shaft[k]})" if layout.drag else ""
+            p.torque.append(_torque(code, p, k, damping))
         if k < order:
             for p in pendulums:
                 _free_acceleration(code, p, x, y, k)

@@ -255,6 +255,14 @@ def _unlock(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, target: int) -> 
 
 
 @part
+def _drop_windup(W: Floats, lay: Layout, lane: int, i: int) -> None:
+    """Count the energy of a damped clutch that opens wound up: its damping takes it while it unwinds by itself."""
+    base = lay.pendulums + i * lay.stride
+    if W[base + lay.p_clutch_damping, lane] > 0.0:
+        W[base + lay.p_work_clutch, lane] += stored_energy(W, lay, lane, i, max(W[base + lay.p_u, lane], 0.0))
+
+
+@part
 def transit(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
     """Carry out the event that ended a lane's step: exact values at the crossing, then the new state.
 
@@ -298,6 +306,8 @@ def transit(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
     if source == LOCKED:
         _unlock(W, Z, lay, lane, i, target)
         return
+    if lay.drag == 1 and source >= ENGAGED and target == FREE:
+        _drop_windup(W, lay, lane, i)
     if source == ENGAGED and target == FREE and not asked and grazes(W, lay, lane, i):
         W[base + lay.p_speed, lane] = W[lay.speed, lane]
         W[base + lay.p_u, lane] = 0.0
@@ -306,7 +316,7 @@ def transit(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
     if source == TAKE_UP and target == FREE:
         if smooth:
             W[base + lay.p_speed, lane] = W[lay.speed, lane]
-    elif BEYOND in (source, target):
+    elif BEYOND in (source, target) and target != FREE:
         W[base + lay.p_u, lane] = W[base + lay.p_limit, lane]
     else:
         W[base + lay.p_u, lane] = 0.0

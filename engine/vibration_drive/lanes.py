@@ -17,7 +17,7 @@ from sprag_study.engine.vibration_drive.bounds import TOO_LONG
 from sprag_study.engine.vibration_drive.cases import PENDULUM_COLUMNS, STOPS, Column, PendulumColumn, stop_column
 from sprag_study.engine.vibration_drive.events import collect_guards, transit
 from sprag_study.engine.vibration_drive.layout import OUT_ENDING, OUT_EVENTS, OUT_RUNUP, OUT_STEPS, OUT_SUMS, Layout
-from sprag_study.engine.vibration_drive.states import count_event, law, set_clutch, set_shaft, watch_fall
+from sprag_study.engine.vibration_drive.states import count_event, is_held, law, set_clutch, set_shaft, watch_fall
 from sprag_study.engine.vibration_drive.stops import next_stop
 from sprag_study.engine.vibration_drive.strobes import FRACTION, begin_at, note
 from sprag_study.engine.vibration_drive.window import primitive, sample, series, watch_extrema
@@ -46,7 +46,7 @@ _CHI, _GRAVITY, _LOAD, _INERTIA = int(Column.CHI), int(Column.GRAVITY), int(Colu
 _BEARING, _LINEAR, _QUADRATIC = int(Column.BEARING), int(Column.LINEAR), int(Column.QUADRATIC)
 _INVERSE_RATE, _SPEED, _MOST_STEPS = int(Column.INVERSE_RATE), int(Column.SPEED), int(Column.MOST_STEPS)
 _FIRST_PENDULUM = stop_column(STOPS)
-_P_COPIED = int(PendulumColumn.LIMIT) + 1
+_P_COPIED = int(PendulumColumn.OVERRUNNING_DAMPING) + 1
 _P_ANGLE, _P_SPEED = int(PendulumColumn.ANGLE), int(PendulumColumn.SPEED)
 _P_WINDUP, _P_CLUTCH = int(PendulumColumn.WINDUP), int(PendulumColumn.CLUTCH)
 
@@ -86,6 +86,8 @@ def load_case(
         column = _FIRST_PENDULUM + i * (PENDULUM_COLUMNS + lay.coefficients)
         for k in range(_P_COPIED):
             W[base + lay.p_ml + k, lane] = row[column + k]
+        if W[base + lay.p_overrunning_damping, lane] > 0.0:
+            W[lay.backstop, lane] = 1.0
         W[base + lay.p_phi, lane] = row[column + _P_ANGLE]
         W[base + lay.p_speed, lane] = row[column + _P_SPEED]
         for k in range(lay.coefficients):
@@ -97,7 +99,7 @@ def load_case(
         set_clutch(W, Z, lay, lane, i, state)
         if literal == 1 and ev.ENGAGED <= state <= ev.BEYOND:
             watch_fall(W, lay, lane, i, row[column + _P_SPEED] >= row[_SPEED])
-    set_shaft(W, Z, lay, lane, _HELD if row[_SPEED] == 0.0 and row[_LOAD] > 0.0 else _ROTATING)
+    set_shaft(W, Z, lay, lane, _HELD if row[_SPEED] == 0.0 and is_held(W, lay, lane) else _ROTATING)
     begin_at(W, Z, lay, lane, starts[case])
     watch_extrema(W, lay, lane, False)
 
@@ -266,8 +268,12 @@ def shorten(W: Floats, lay: Layout, lane: int, g: Floats) -> None:
         for _ in range(MOST_HALVINGS):
             primitive(W, lay, lane, W[base + lay.p_u, lane], base + lay.p_speed, lay.speed, g)
             u = evaluate(g, lay.order, x)
-            series(W, lay, lane, base + lay.p_torque, g)
             torque = law(W, base + lay.p_force, lay.coefficients, lane, u)
+            if lay.drag == 1:
+                for k in range(lay.order + 1):
+                    g[k] = W[base + lay.p_speed + k, lane] - W[lay.speed + k, lane]
+                torque += W[base + lay.p_rate, lane] * evaluate(g, lay.order, x)
+            series(W, lay, lane, base + lay.p_torque, g)
             if abs(torque - evaluate(g, lay.order, x)) <= W[base + lay.p_allowed, lane]:
                 break
             x *= 0.5

@@ -57,7 +57,8 @@ class Layout(NamedTuple):
     f_stop: int
     period: int
     # parameters; acc_x, acc_y are the amplitudes of the base's acceleration, inverse_rate scales accelerations to
-    # speeds, linear and quadratic are the torques per speed and per square of it that resist the shaft
+    # speeds, backstop is 1 where the shaft cannot be turned back, linear and
+    # quadratic are the torques per speed and per square of it that resist the shaft
     nu: int
     acc_x: int
     acc_y: int
@@ -65,6 +66,7 @@ class Layout(NamedTuple):
     sin_chi: int
     gravity: int
     load: int
+    backstop: int
     linear: int
     quadratic: int
     inertia: int
@@ -135,6 +137,8 @@ class Layout(NamedTuple):
     p_inertia: int
     p_backlash: int
     p_limit: int
+    p_clutch_damping: int
+    p_overrunning_damping: int
     # mode flags, and the bands in which relative speed, windup and torque must stay
     p_locked: int
     p_engaged: int
@@ -153,6 +157,7 @@ class Layout(NamedTuple):
     p_sum_torque: int
     p_work_input: int
     p_work_loss: int
+    p_work_clutch: int
     p_time_engaged: int
     p_time_beyond: int
     p_engagements: int
@@ -181,9 +186,10 @@ class Layout(NamedTuple):
     p_x_acc_min: int
     p_x_torque_max: int
     p_x_u_max: int
-    # the clutch law and the law in force (zero where free, straight where beyond the data)
+    # the clutch law and the law in force (zero where free, straight where beyond the data), and the damping in force
     p_law: int
     p_force: int
+    p_rate: int
     # series: speed and torque (order + 1), drive by the base (order)
     p_speed: int
     p_torque: int
@@ -204,10 +210,10 @@ _EXTREMA = "phi_max {0}phi_min {0}speed_max {0}speed_min {0}acc_max {0}acc_min {
 _SHAFT_EXTREMA = "speed_max {0}speed_min {0}acc_max {0}sum_max {0}power_max"
 _beside(
     # As the columns of a case (`PendulumColumn`) are copied.
-    "p_ml p_spring p_damping p_inverse_inertia p_inertia p_backlash p_limit",
+    "p_ml p_spring p_damping p_inverse_inertia p_inertia p_backlash p_limit p_clutch_damping p_overrunning_damping",
     # Sums that begin at 0, those of the shaft and those of a pendulum.
     "sum_held time_held time_rotating time_driven speed_square speed_cube work_clutch",
-    "p_sum_phi p_sum_torque p_work_input p_work_loss p_time_engaged p_time_beyond p_engagements",
+    "p_sum_phi p_sum_torque p_work_input p_work_loss p_work_clutch p_time_engaged p_time_beyond p_engagements",
     # What is handed out at the end of a window, as far as characteristics reads it.
     "work_clutch speed_max speed_min acc_max sum_max power_max turn_0 turn_1 turn_2 speed_0 speed_2 energy_0 energy_2 "
     "input_1 square_1 cube_1 driving_max energy_lost",

@@ -24,8 +24,8 @@ from sprag_study.engine.vibration_drive.states import (
     SKIP_T,
     SKIP_U,
     SKIP_W,
+    clutch_torque,
     count_event,
-    law,
     law_slope,
     set_clutch,
 )
@@ -234,8 +234,8 @@ def _shared_acceleration(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, siz
             W[notes + _MEETS, lane] = 1.0
             W[notes + _PULL, lane] = W[base + lay.p_inertia, lane] * acceleration(W, lay, lane, j)
             W[notes + _MOST, lane] = W[base + lay.p_law, lane]
-        elif Z[lane, j] >= ENGAGED:
-            push += law(W, base + lay.p_force, lay.coefficients, lane, W[base + lay.p_u, lane])
+        elif Z[lane, j] >= ENGAGED or lay.drag == 1:
+            push += clutch_torque(W, lay, lane, j)
     rate = 0.0
     if Z[lane, SHAFT_STATE] == ROTATING or _excess(W, lay, lane, push, 0.0) < 0.0:
         rate = _consistent(W, lay, lane, push)
@@ -271,6 +271,9 @@ def _shared_jerk(W: Floats, Z: Ints, lay: Layout, lane: int, rate: float) -> Non
             w = W[base + lay.p_speed, lane] - W[lay.speed, lane]
             u = W[base + lay.p_u, lane]
             push += w * law_slope(W, base + lay.p_force, lay.coefficients, lane, u)
+        if lay.drag == 1 and not W[notes + _MEETS, lane] > 0.0:
+            swing = acceleration(W, lay, lane, j) - clutch_torque(W, lay, lane, j) / W[base + lay.p_inertia, lane]
+            push += W[base + lay.p_rate, lane] * (swing - rate)
     jerk = 0.0
     if Z[lane, SHAFT_STATE] == ROTATING or rate > 0.0:
         jerk = _consistent(W, lay, lane, push)

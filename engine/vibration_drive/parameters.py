@@ -17,7 +17,7 @@ _INF = math.inf
 #: States of clutches among the initial values.
 START_STATES = frozenset({"initial_windup", "initial_clutch"})
 #: Torques that depend on speeds: a drive in which any of them is given needs a kernel that has them.
-DRAG = frozenset({"bearing_damping", "linear_load", "quadratic_load"})
+DRAG = frozenset({"bearing_damping", "linear_load", "quadratic_load", "clutch_damping", "overrunning_damping"})
 #: Parameters that a study has only where they are given: studies from before they existed keep their cases.
 ONLY_GIVEN = START_STATES | DRAG
 
@@ -34,6 +34,27 @@ _PARAMETERS = (
     Parameter("pendulums.N.spring_arm", "a", "m", -1e3, 1e3, False, 0.0, "arm of the centring spring"),
     Parameter("pendulums.N.damping", "lambda", "N*m*s/rad", 0.0, 1e6, False, 0.0, "viscous damping"),
     Parameter("pendulums.N.backlash", "delta", "rad", 0.0, 1e3, False, 0.0, "backlash of the freewheel"),
+    Parameter(
+        "pendulums.N.clutch_damping",
+        "lambda_k",
+        "N*m*s/rad",
+        0.0,
+        1e6,
+        False,
+        0.0,
+        "viscous damping of its freewheel while it transmits torque, parallel to the law of the clutch",
+    ),
+    Parameter(
+        "pendulums.N.overrunning_damping",
+        "lambda_o",
+        "N*m*s/rad",
+        0.0,
+        1e6,
+        False,
+        0.0,
+        "viscous drag of its freewheel while it overruns; where it is not 0, a backstop keeps the shaft from turning "
+        "back",
+    ),
     Parameter("pendulums.N.initial_angle", "phi(0)", "rad", -1e3, 1e3, False, 0.0, "angle at t = 0"),
     Parameter("pendulums.N.initial_speed", "phi'(0)", "rad/s", -1e6, 1e6, False, 0.0, "angular speed at t = 0"),
     Parameter(
@@ -100,6 +121,8 @@ _PLAUSIBLE: Mapping[str, tuple[float, Sentence]] = {
     "spring_rate": (1e8, IN_ANOTHER_UNIT),
     "damping": (100.0, IN_ANOTHER_UNIT),
     "bearing_damping": (100.0, IN_ANOTHER_UNIT),
+    "clutch_damping": (100.0, IN_ANOTHER_UNIT),
+    "overrunning_damping": (100.0, IN_ANOTHER_UNIT),
     "linear_load": (1e3, IN_ANOTHER_UNIT),
     "quadratic_load": (100.0, IN_ANOTHER_UNIT),
     "backlash": (0.1, IN_DEGREES),

@@ -60,7 +60,7 @@ _MEANS = frozenset(
         "power.loss.mean", "power.bearing.mean", "power.linear.mean", "power.quadratic.mean", "power.stored.mean",
         "efficiency", "fraction.rotating", "fraction.held", "fraction.driven",
         "clutches.engagements_per_period", "angle.mean", "fraction.engaged", "fraction.beyond_data", "power.input",
-        "power.loss",
+        "power.loss", "power.clutch_loss",
     }
 )  # fmt: skip
 

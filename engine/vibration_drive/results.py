@@ -22,7 +22,7 @@ def _shaft() -> tuple[ResultInfo, ...]:
         r("power.clutch.mean", "W", "mean power the clutches give to the shaft"),
         r("power.clutch.max", "W", "largest power the clutches give to the shaft"),
         r("power.input.mean", "W", "mean power the vibrating base puts into the pendulums"),
-        r("power.loss.mean", "W", "mean power lost in the damping of the pendulums and of the shaft"),
+        r("power.loss.mean", "W", "mean power lost in the damping of the pendulums, of the shaft and of the clutches"),
         r("power.bearing.mean", "W", "mean power lost in the viscous damping of the shaft", generation=1),
         r("power.linear.mean", "W", "mean power against the part of the load that rises with the speed", generation=1),
         r(
@@ -52,8 +52,8 @@ def _shaft() -> tuple[ResultInfo, ...]:
 
 
 def _pendulum(index: int) -> tuple[ResultInfo, ...]:
-    def r(name: str, unit: str, description: str, kind: Kind = "real") -> ResultInfo:
-        return ResultInfo(f"pendulums.{index}.{name}", unit, description, kind)
+    def r(name: str, unit: str, description: str, kind: Kind = "real", generation: int = 0) -> ResultInfo:
+        return ResultInfo(f"pendulums.{index}.{name}", unit, description, kind, generation=generation)
 
     return (
         r("angle.mean", "rad", "mean angle"),
@@ -72,6 +72,12 @@ def _pendulum(index: int) -> tuple[ResultInfo, ...]:
         r("engagements", "1", "engagements of its clutch during the window", "count"),
         r("power.input", "W", "mean power the base puts into it"),
         r("power.loss", "W", "mean power lost in its damping"),
+        r(
+            "power.clutch_loss",
+            "W",
+            "mean power lost in the damping of its clutch, engaged and overrunning",
+            generation=2,
+        ),
     )
 
 

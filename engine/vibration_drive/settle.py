@@ -140,7 +140,7 @@ def settle(
     search = Search(module, matrix, settings, given=starts)
     results = _Results(cases, n, search.starts.shape[1])
     if cases:
-        free = unloaded(matrix)
+        free = unloaded(matrix, n)
         _settle(search, np.flatnonzero(~free), results)
         _unloaded(module, search, np.flatnonzero(free), results)
         results.values[results.endings != _OK] = np.nan

@@ -24,6 +24,8 @@ Floats = NDArray[np.float64]
 
 #: Names of states in trajectories, by number.
 CLUTCH_NAMES = {int(state): state.name.lower() for state in Clutch}
+#: States in which the law of a clutch, and its damping, are in force.
+_WOUND = [int(Clutch.ENGAGED), int(Clutch.BEYOND)]
 SHAFT_NAMES = {int(state): state.name.lower() for state in Shaft}
 
 
@@ -145,11 +147,13 @@ def sampled(values: Mapping[str, float], found: Integration, times: Floats) -> T
     }
     for column, name in zip(ShaftSample, ("shaft.angle", "shaft.speed", "shaft.acceleration", "torque"), strict=True):
         out[name] = samples[:, column]
-    if value["shaft.load"] > 0.0:
+    overrunning = [values.get(f"pendulums.{i}.overrunning_damping", 0.0) for i in range(n)]
+    if value["shaft.load"] > 0.0 or max(overrunning) > 0.0:
         # As for the minimum in ``characteristics``: only rounding errors can turn back a loaded shaft.
         out["shaft.speed"] = np.maximum(out["shaft.speed"], 0.0)
     out["power.useful"] = _load_torque(value, out["shaft.speed"]) * out["shaft.speed"]
     out["power.clutch"] = out["torque"] * out["shaft.speed"]
+    clutch_losses: list[Floats] = []
     for i in range(n):
         block = samples[:, pendulum_samples(i)]
         speed = block[:, PendulumSample.SPEED]
@@ -161,9 +165,14 @@ def sampled(values: Mapping[str, float], found: Integration, times: Floats) -> T
         damping = values.get(f"pendulums.{i}.damping", 0.0)
         out[f"pendulums.{i}.power.input"] = moment * block[:, PendulumSample.DRIVE] * speed
         out[f"pendulums.{i}.power.loss"] = damping * np.square(speed)
+        clutch = values.get(f"pendulums.{i}.clutch_damping", 0.0)
+        rate = np.select([states[:, 1 + i] == Clutch.FREE, np.isin(states[:, 1 + i], _WOUND)], [overrunning[i], clutch])
+        clutch_losses.append(rate * np.square(speed - out["shaft.speed"]))
     out["power.input"] = sum((out[f"pendulums.{i}.power.input"] for i in range(n)), np.zeros(done))
-    bearing = value["shaft.bearing_damping"] * np.square(out["shaft.speed"])
-    out["power.loss"] = sum((out[f"pendulums.{i}.power.loss"] for i in range(n)), bearing)
+    lost = value["shaft.bearing_damping"] * np.square(out["shaft.speed"])
+    for i in range(n):
+        lost = lost + out[f"pendulums.{i}.power.loss"] + clutch_losses[i]
+    out["power.loss"] = lost
     named = {"shaft": [SHAFT_NAMES[int(s)] for s in states[:, 0]]}
     for i in range(n):
         named[f"pendulums.{i}"] = [CLUTCH_NAMES[int(s)] for s in states[:, 1 + i]]

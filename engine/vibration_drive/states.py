@@ -19,6 +19,7 @@ FREE, TAKE_UP, ENGAGED, BEYOND, LOCKED, START = (int(state) for state in Clutch)
 HELD, ROTATING = int(Shaft.HELD), int(Shaft.ROTATING)
 _W_LOW, _W_HIGH = int(Band.W_LOW), int(Band.W_HIGH)
 _AT_DATA_END, _AT_FIRST, _BANDS = int(Threshold.DATA_END), int(Threshold.FIRST_COEFFICIENT), len(Band)
+_IF_DAMPED = int(Threshold.ZERO_IF_DAMPED)
 
 # Columns of a lane's integers. The first eight are the pendulums' clutch states.
 SHAFT_STATE = 8
@@ -63,6 +64,16 @@ def law(W: Floats, first: int, count: int, lane: int, u: float) -> float:
 def law_slope(W: Floats, first: int, count: int, lane: int, u: float) -> float:
     """Derivative of ``law``."""
     return float(_slope(_coefficients(W, first, count, lane), u))
+
+
+@part
+def clutch_torque(W: Floats, lay: Layout, lane: int, i: int) -> float:
+    """Torque of the clutch of pendulum ``i``, which is not locked, by what is in force at the lane's state."""
+    base = lay.pendulums + i * lay.stride
+    torque = law(W, base + lay.p_force, lay.coefficients, lane, W[base + lay.p_u, lane])
+    if lay.drag == 1:
+        torque += W[base + lay.p_rate, lane] * (W[base + lay.p_speed, lane] - W[lay.speed, lane])
+    return float(torque)
 
 
 @inlined
@@ -114,6 +125,8 @@ def set_clutch(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, state: int) -
             edge = W[base + lay.p_limit, lane]
         elif kind == _AT_FIRST:
             edge = W[base + lay.p_law, lane]
+        elif kind == _IF_DAMPED:
+            edge = 0.0 if W[base + lay.p_clutch_damping, lane] > 0.0 else -NEVER
         elif kind != 0:
             edge = 0.0
         W[base + lay.p_w_low + band, lane] = edge
@@ -130,6 +143,11 @@ def set_clutch(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, state: int) -
             if k == 0:
                 value = law(W, base + lay.p_law, lay.coefficients, lane, limit) - rate * limit
         W[base + lay.p_force + k, lane] = value
+    W[base + lay.p_rate, lane] = 0.0
+    if state == FREE:
+        W[base + lay.p_rate, lane] = W[base + lay.p_overrunning_damping, lane]
+    elif ENGAGED <= state <= BEYOND:
+        W[base + lay.p_rate, lane] = W[base + lay.p_clutch_damping, lane]
     W[base + lay.p_locked, lane] = 1.0 if state == LOCKED else 0.0
     W[base + lay.p_engaged, lane] = 1.0 if state >= ENGAGED else 0.0
     W[base + lay.p_beyond, lane] = 1.0 if state == BEYOND else 0.0
@@ -150,6 +168,12 @@ def count_event(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
 
 
 @part
+def is_held(W: Floats, lay: Layout, lane: int) -> bool:
+    """Whether the shaft is held when it stands: without a load and a backstop nothing does."""
+    return bool(W[lay.load, lane] > 0.0 or W[lay.backstop, lane] > 0.0)
+
+
+@part
 def set_shaft(W: Floats, Z: Ints, lay: Layout, lane: int, state: int) -> None:
     """Put the shaft into a state: its guard, its flag, its mobility."""
     load = W[lay.load, lane]
@@ -157,7 +181,7 @@ def set_shaft(W: Floats, Z: Ints, lay: Layout, lane: int, state: int) -> None:
     W[lay.rotating, lane] = 1.0 if state == ROTATING else 0.0
     W[lay.sum_high, lane] = load if state == HELD else NEVER
     # Without a load nothing slows down the shaft, so it is never held.
-    W[lay.speed_low, lane] = 0.0 if state == ROTATING and load > 0.0 else -NEVER
+    W[lay.speed_low, lane] = 0.0 if state == ROTATING and is_held(W, lay, lane) else -NEVER
     _set_mobility(W, Z, lay, lane)
 
 

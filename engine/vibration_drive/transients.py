@@ -145,7 +145,7 @@ class _Settled:
             self.seen[active, 0] = turned / (over * search.matrix[active, Column.PERIOD])
         speeds = search.history[active, -ROUND:, SHAFT_SPEED]
         # Without a load nothing slows down the shaft: its speed is settled once no clutch changes it.
-        steady = unloaded(search.matrix[active]) & np.all(speeds == speeds[:, :1], axis=1)
+        steady = unloaded(search.matrix[active], search.kernel.LAYOUT.n) & np.all(speeds == speeds[:, :1], axis=1)
         self.seen[active[steady], 0] = speeds[steady, 0]
         others: Ints = active[~steady]
         return others

@@ -31,6 +31,8 @@ class DrivePendulum(TypedDict, total=False):
     spring_arm: Quantity
     damping: Quantity
     backlash: Quantity
+    clutch_damping: Quantity
+    overrunning_damping: Quantity
     initial_angle: Quantity
     initial_speed: Quantity
     initial_windup: Quantity
@@ -87,6 +89,8 @@ class Drive(Studies):
         "pendulums.*.spring_arm",
         "pendulums.*.damping",
         "pendulums.*.backlash",
+        "pendulums.*.clutch_damping",
+        "pendulums.*.overrunning_damping",
         "pendulums.*.initial_angle",
         "pendulums.*.initial_speed",
         "pendulums.*.initial_windup",

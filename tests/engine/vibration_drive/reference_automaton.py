@@ -31,7 +31,7 @@ class Automaton(Machine):
         n = self.n
         if self.shaft_state == "held":
             yield lambda t, y: self.load - sum(self.torques(t, y)[0]), lambda y, t: self.turn("rotating")
-        elif self.load > 0.0:
+        elif self.load > 0.0 or self.backstop:
             yield lambda t, y: y[self.shaft], self.stop
         for i, p in enumerate(self.pendulums):
             state = self.clutches[i]
@@ -54,6 +54,8 @@ class Automaton(Machine):
                     lambda y, t, i=i: self.unlock(i, y, "engaged"),
                 )
             else:
+                if p.clutch_damping > 0.0:
+                    yield lambda t, y, i=i: self.torques(t, y)[0][i], lambda y, t, i=i: self.release(i, y)
                 if state == "engaged":
                     yield windup, lambda y, t, i=i: self.wind(i, y, 0.0, "free")
                     if p.limit < math.inf:
@@ -83,6 +85,12 @@ class Automaton(Machine):
         self.out.engagements += self.clutches[i] == "take_up"
         y[2 * self.n + i] = windup
         self.clutches[i] = state
+
+    def release(self, i: int, y: Floats) -> None:
+        """A damped clutch does not pull: it opens wound up, and its damping takes what the spring has."""
+        y[4 * self.n + 8 + i] += self.pendulums[i].energy(float(y[2 * self.n + i]))
+        y[2 * self.n + i] = 0.0
+        self.clutches[i] = "free"
 
     def overrun(self, i: int, y: Floats) -> None:
         y[self.n + i] = y[self.shaft]

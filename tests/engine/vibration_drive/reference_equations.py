@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import quad
 
 Floats = NDArray[np.float64]
 
@@ -27,6 +28,12 @@ class Pendulum:
     backlash: float
     law: tuple[float, ...]
     limit: float
+    clutch_damping: float
+    overrunning_damping: float
+
+    def energy(self, u: float) -> float:
+        """Energy in the clutch at a windup."""
+        return float(quad(self.torque, 0.0, u, points=[self.limit] if self.limit < u else None, epsabs=1e-15)[0])
 
     def torque(self, u: Any) -> Any:
         """Law (3), straight beyond the end of the data; numbers or arrays."""
@@ -80,19 +87,23 @@ class Machine:
                 get(f"pendulums.{i}.backlash"),
                 law,
                 get("clutch.windup_limit", math.inf),
+                get(f"pendulums.{i}.clutch_damping"),
+                get(f"pendulums.{i}.overrunning_damping"),
             )
             for i in range(self.n)
         ]
         # Angles, speeds, windups; shaft's angle and speed; integrals: torque, input, loss, clutch work, angles; square
-        # and cube of the shaft's speed.
+        # and cube of the shaft's speed, what the clutches lose.
         n = self.n
         self.shaft = 3 * n + 1
-        self.start = np.zeros(4 * n + 8)
+        self.start = np.zeros(5 * n + 8)
         self.start[:n] = [get(f"pendulums.{i}.initial_angle") for i in range(n)]
         self.start[n : 2 * n] = [get(f"pendulums.{i}.initial_speed") for i in range(n)]
         self.start[self.shaft] = get("shaft.initial_speed")
         self.clutches = ["free"] * n
-        self.shaft_state = "rotating" if self.start[self.shaft] > 0.0 or self.load == 0.0 else "held"
+        self.backstop = any(p.overrunning_damping > 0.0 for p in self.pendulums)
+        stops = self.load > 0.0 or self.backstop
+        self.shaft_state = "rotating" if self.start[self.shaft] > 0.0 or not stops else "held"
 
     def base(self, t: Any) -> tuple[Any, Any]:
         """x'' and y'' of (2)."""
@@ -111,12 +122,19 @@ class Machine:
         """Torque that resists the rotating shaft."""
         return self.load + (self.bearing + self.linear) * speed + self.quadratic * speed * np.abs(speed)
 
+    def rate(self, i: int) -> float:
+        """Damping of a clutch in its state."""
+        p = self.pendulums[i]
+        return {"free": p.overrunning_damping, "engaged": p.clutch_damping, "beyond": p.clutch_damping}.get(
+            self.clutches[i], 0.0
+        )
+
     def torques(self, t: Any, y: Any) -> tuple[list[Any], Any]:
         """Torque of every clutch and the shaft's acceleration in the present mode."""
-        sprung = [
-            self.pendulums[i].torque(y[2 * self.n + i]) if self.clutches[i] in ("engaged", "beyond") else 0.0 * t
-            for i in range(self.n)
-        ]
+        sprung = []
+        for i, p in enumerate(self.pendulums):
+            spring = p.torque(y[2 * self.n + i]) if self.clutches[i] in ("engaged", "beyond") else 0.0 * t
+            sprung.append(spring + self.rate(i) * (y[self.n + i] - y[self.shaft]))
         locked = [i for i in range(self.n) if self.clutches[i] == "locked"]
         free = {i: self.free_moment(i, t, y) for i in locked}
         acceleration = 0.0 * t
@@ -145,6 +163,7 @@ class Machine:
             out[3 * n + 3] += p.moment * speed * (ax * math.cos(y[i]) + ay * math.sin(y[i]))
             out[3 * n + 4] += p.damping * speed**2
             out[3 * n + 6 + i] = y[i]
+            out[4 * n + 8 + i] = self.rate(i) * (speed - shaft) ** 2
         out[3 * n] = shaft
         out[self.shaft] = acceleration
         out[3 * n + 2] = sum(torque)

@@ -65,6 +65,9 @@ class Drive(Automaton):
         self.out.mean["power.quadratic.mean"] = self.quadratic * cube
         useful = self.load * mean[3 * n] + self.linear * square + self.quadratic * cube
         self.out.mean["power.useful.mean"] = float(useful)
+        clutches = mean[4 * n + 8 : 5 * n + 8]
+        self.out.mean["power.loss.mean"] += float(np.sum(clutches))
+        self.out.mean |= {f"pendulums.{i}.power.clutch_loss": float(clutches[i]) for i in range(n)}
         self.out.mean |= {f"pendulums.{i}.angle.mean": float(mean[3 * n + 6 + i]) for i in range(n)}
 
     def advance(self, t: float, end: float, y: Floats) -> Floats:

@@ -43,6 +43,12 @@ LITERAL_STARTS = {
     (state, Quantity.RELATIVE_SPEED, UP, Threshold.ZERO, Clutch.START) for state in (Clutch.ENGAGED, Clutch.BEYOND)
 }
 
+#: A clutch with damping does not pull: it opens where its torque falls to zero, perhaps still wound up.
+DAMPED_RELEASES = {
+    (state, Quantity.CLUTCH_TORQUE, DOWN, Threshold.ZERO_IF_DAMPED, Clutch.FREE)
+    for state in (Clutch.ENGAGED, Clutch.BEYOND)
+}
+
 
 def _key(row: Transition) -> tuple[object, ...]:
     return (row.source, row.quantity, row.direction, row.threshold, row.target)
@@ -53,11 +59,13 @@ def test_table_is_the_model() -> None:
     def typed(keys: object) -> set[tuple[object, ...]]:
         return {(type(key[0]).__name__, *key) for key in keys}  # type: ignore[attr-defined]
 
-    always = [_key(row) for row in TRANSITIONS if not row.literal_only]
+    damped = {_key(row) for row in TRANSITIONS if row.threshold is Threshold.ZERO_IF_DAMPED}
+    always = [_key(row) for row in TRANSITIONS if not row.literal_only and _key(row) not in damped]
     literal = {_key(row) for row in TRANSITIONS if row.literal_only}
     assert typed(always) == typed(MODEL_TABLE)
     assert len(always) == len(MODEL_TABLE)
     assert typed(literal) >= typed(LITERAL_STARTS)
+    assert typed(damped) == typed(DAMPED_RELEASES)
     # Anything else that literal resets watch only waits for the speed to fall and leaves the state as it is.
     assert all(key[0] == key[4] and key[2] == DOWN for key in literal - LITERAL_STARTS)
 
@@ -73,6 +81,7 @@ EDGES = {
     (Quantity.WINDUP, DOWN): Band.U_LOW,
     (Quantity.WINDUP, UP): Band.U_HIGH,
     (Quantity.LOCK_TORQUE, DOWN): Band.T_LOW,
+    (Quantity.CLUTCH_TORQUE, DOWN): Band.T_LOW,
     (Quantity.LOCK_TORQUE, UP): Band.T_HIGH,
 }
 

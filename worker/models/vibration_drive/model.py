@@ -106,6 +106,7 @@ _PENDULUM_OF_IT: Final = {
 }  # fmt: skip
 
 _DRAG_OF_IT: Final = {"shaft.bearing_damping": 1e-3, "shaft.quadratic_load": 1e-5}
+_DRAG_OF_CLUTCHES: Final = {"clutch_damping": 0.05, "overrunning_damping": 1e-4}
 
 _PENDULUM = re.compile(r"pendulums\.(\d+)\.")
 _COEFFICIENT = re.compile(r"(?:^|\.)clutch\.coefficients\.(\d+)$")
@@ -336,8 +337,9 @@ class VibrationDrive(Model):
 
         pendulums, coefficients, tolerance, drag = _key_of(shape)
         columns = _DRIVEN | (_DRAG_OF_IT if drag else {})
+        swinging = _PENDULUM_OF_IT | (_DRAG_OF_CLUTCHES if drag else {})
         for number in range(pendulums):
-            columns |= {f"pendulums.{number}.{name}": value for name, value in _PENDULUM_OF_IT.items()}
+            columns |= {f"pendulums.{number}.{name}": value for name, value in swinging.items()}
         columns |= {f"clutch.coefficients.{k}": 200.0 for k in range(max(1, coefficients))}
         run = Run(duration=Span(20.0, "periods"), tolerance=tolerance)
         return simulate(columns, run, cases=1).values.tobytes()

@@ -126,6 +126,7 @@ PRESENTATION: Final = Presentation(
             (f"pendulums.initial_{name}" for name in ("angle", "speed", "windup", "clutch")), "theory#the-automaton"
         ),
         "shaft.initial_speed": "theory#the-automaton",
+        **{f"pendulums.{name}": "theory#the-clutches" for name in ("clutch_damping", "overrunning_damping")},
         **{f"shaft.{name}": "theory#the-load" for name in ("load", "bearing_damping", "linear_load", "quadratic_load")},
         **{
             f"{clutch}.{name}": "theory#clutch-law-from-measured-data"
