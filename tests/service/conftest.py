@@ -151,17 +151,22 @@ def chunk_cases() -> int:
     return 2
 
 
-@pytest.fixture
-def settings(tmp_path: Path, empty_database: bytes, chunk_cases: int, monkeypatch: pytest.MonkeyPatch) -> Settings:
-    """Settings of a service of this test, whatever the environment says."""
+def settings_of(folder: Path, database: bytes, chunk_cases: int, monkeypatch: pytest.MonkeyPatch) -> Settings:
+    """Settings of a service with a copy of a database in ``folder``, whatever the environment says."""
     for name in Settings.model_fields:
         monkeypatch.delenv(f"SPRAG_{name.upper()}", raising=False)
-    database = tmp_path / "sprag.sqlite3"
-    database.write_bytes(empty_database)
-    return Settings(database=str(database), chunk_cases=chunk_cases, processes=2)
+    file = folder / "sprag.sqlite3"
+    file.write_bytes(database)
+    return Settings(database=str(file), chunk_cases=chunk_cases, processes=2)
 
 
 @pytest.fixture
+def settings(tmp_path: Path, empty_database: bytes, chunk_cases: int, monkeypatch: pytest.MonkeyPatch) -> Settings:
+    """Settings of a service of this test."""
+    return settings_of(tmp_path, empty_database, chunk_cases, monkeypatch)
+
+
+@pytest.fixture(scope="session")
 def connect(portal: BlockingPortal) -> Callable[..., httpx.Client]:
     """Gives a client of an application."""
 
@@ -171,14 +176,21 @@ def connect(portal: BlockingPortal) -> Callable[..., httpx.Client]:
     return client
 
 
-@pytest.fixture
-def service(settings: Settings, connect: Callable[..., httpx.Client]) -> Iterator[Service]:
-    """A service with an empty database."""
+@contextmanager
+def in_process(settings: Settings, connect: Callable[..., httpx.Client]) -> Iterator[Service]:
+    """A service in this process."""
     computer = InThread()
     with Store.open(settings.database_url, chunking=chunking(settings)) as store:
         checker, writer = InThread(), InThread()
         app = create_app(settings, store=store, computer=computer, checker=checker, writer=writer)
         yield Service(app, connect(app), store, computer, checker, writer)
+
+
+@pytest.fixture
+def service(settings: Settings, connect: Callable[..., httpx.Client]) -> Iterator[Service]:
+    """A service with an empty database."""
+    with in_process(settings, connect) as started:
+        yield started
 
 
 @pytest.fixture

@@ -14,6 +14,7 @@ from playwright.sync_api import expect
 from sprag_study.worker import models
 from sprag_study.worker.models import ChunkResult
 from tests.service.calibrating import calibration
+from tests.service.conftest import in_process, settings_of
 from tests.service.http.web.fields import named
 from tests.service.http.web.test_accessibility import BEYOND, preset
 from tests.service.rounds import run_round
@@ -22,9 +23,12 @@ from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
+    import httpx
     from playwright.sync_api import Locator, Page
 
+    from sprag_study.service.settings import Settings
     from sprag_study.worker.study import Study
     from tests.service.conftest import Service
 
@@ -79,20 +83,43 @@ def end(service: Service, study_id: str) -> None:
     store.work.settle(epoch, number)
 
 
-@pytest.fixture
-def kinds(service: Service) -> dict[str, str]:
-    """A study of every kind, and a variant."""
+@pytest.fixture(scope="module")
+def ended(
+    tmp_path_factory: pytest.TempPathFactory, empty_database: bytes, connect: Callable[..., httpx.Client]
+) -> tuple[bytes, dict[str, str]]:
+    """A database with a study of every kind and a variant, and their ids."""
     variant = copy.deepcopy(PLAIN)
     variant["base"]["pendulums"][0]["arm"] = "36 mm"
-    return {
-        "search": search(service, best=[{"result": "efficiency", "max": True}], generations=4),
-        "calibration": calibration(service),
-        "variant": run(service, {**variant, "name": "Longer", **LOADS}),
-        "batch": run(service, {**PLAIN, "name": "Batch", **BATCH}),
-        "shaft": run(service, {**preset("question_masses"), "name": "Shaft"}),
-        "single": run(service, {**PLAIN, "name": "One"}),
-        "grid": run(service, {**PLAIN, "name": "As drawn", **LOADS}),
-    }
+    folder = tmp_path_factory.mktemp("ended")
+    with (
+        pytest.MonkeyPatch.context() as monkeypatch,
+        in_process(settings_of(folder, empty_database, 2, monkeypatch), connect) as service,
+    ):
+        ids = {
+            "search": search(service, best=[{"result": "efficiency", "max": True}], generations=4),
+            "calibration": calibration(service),
+            "variant": run(service, {**variant, "name": "Longer", **LOADS}),
+            "batch": run(service, {**PLAIN, "name": "Batch", **BATCH}),
+            "shaft": run(service, {**preset("question_masses"), "name": "Shaft"}),
+            "single": run(service, {**PLAIN, "name": "One"}),
+            "grid": run(service, {**PLAIN, "name": "As drawn", **LOADS}),
+        }
+        service.store.backup(folder / "copy.sqlite3")
+    return (folder / "copy.sqlite3").read_bytes(), ids
+
+
+@pytest.fixture
+def settings(
+    tmp_path: Path, ended: tuple[bytes, dict[str, str]], chunk_cases: int, monkeypatch: pytest.MonkeyPatch
+) -> Settings:
+    """Settings of a service with these studies."""
+    return settings_of(tmp_path, ended[0], chunk_cases, monkeypatch)
+
+
+@pytest.fixture
+def kinds(ended: tuple[bytes, dict[str, str]]) -> dict[str, str]:
+    """The ids of the studies by their kinds."""
+    return ended[1]
 
 
 @pytest.fixture
