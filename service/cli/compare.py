@@ -66,7 +66,10 @@ def compare(
         return
     columns: list[Column] = [(_("input"), False, True), *((name, False) for name in found.names)]
     rows = [(pointer, *map(_text, values)) for pointer, values in found.inputs.items()]
-    show_table(_("inputs that differ"), columns, rows)
+    if rows:
+        show_table(_("inputs that differ"), columns, rows)
+    else:
+        say(_("No inputs differ."))
     if not found.curves:
         say(_("These studies have no varying parameter in common, so there are no curves to compare."))
     for name, drawn in zip(found.names, found.curves, strict=False):

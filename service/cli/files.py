@@ -17,6 +17,7 @@ from sprag_study.service.cli.console import CommandFailureError, TroubleError, W
 from sprag_study.service.cli.table_files import named, with_tables
 from sprag_study.service.faults import Fault, Kind
 from sprag_study.service.languages import N_, _
+from sprag_study.service.presets import preset_names, preset_text
 from sprag_study.service.spec.report import SpecError
 from sprag_study.service.stale_files import mark, sweep
 from sprag_study.service.table_rows import decoded
@@ -80,6 +81,16 @@ def decode(path: str, data: bytes) -> str:
     return text
 
 
+def is_preset(name: str) -> bool:
+    """Whether a name stands for a study that comes with the program: there is no file of that name."""
+    return name in preset_names() and not Path(name).exists()
+
+
+def _preset(name: str) -> tuple[str, bytes]:
+    file, text = preset_text(name)
+    return file, text.encode()
+
+
 def _format(path: str, data: bytes) -> Literal["json", "toml"]:
     """The format by the ending of the name; where that is unknown, by the first character."""
     suffix = Path(path).suffix.lower()
@@ -91,7 +102,7 @@ def _format(path: str, data: bytes) -> Literal["json", "toml"]:
 def read_spec(
     path: str, points: str | None = None, limit: int = MAX_DATA_BYTES, files: Sequence[str] | None = None
 ) -> object:
-    """The plain data of the spec in a JSON or TOML file, or standard input for "-".
+    """The plain data of the spec in a JSON or TOML file, of a preset by its name, or of standard input for "-".
 
     The cases of the CSV file ``points``, if given, replace the spec's axes; it may have ``limit`` bytes. The
     CSV files of ``files`` (``PLACE=FILE``) are tables of the machine. Raises WrongInputError with every problem found.
@@ -103,9 +114,9 @@ def read_spec(
 
     if path == points == "-":
         raise wrong_option("--points", "conflict", N_("standard input is the spec already"), allowed=_("a file"))
-    data = read_bytes(path, MAX_BODY_BYTES)
+    name, data = (path, read_bytes(path, MAX_BODY_BYTES)) if not is_preset(path) else _preset(path)
     try:
-        spec = load_spec(data, _format(path, data))
+        spec = load_spec(data, _format(name, data))
     except SpecError as error:
         raise spec_failure(path, error) from error
     if tables and isinstance(spec, Mapping):

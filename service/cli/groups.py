@@ -11,6 +11,8 @@ from typer.core import TyperGroup
 from typer.main import get_command_from_info, get_group_from_info
 from typer.models import CommandInfo, TyperInfo
 
+from sprag_study.service.languages import _
+
 #: Longest first sentence of a help text.
 _SENTENCE: Final = 400
 #: Options of every command, which may stand anywhere in the line, and how many values each has.
@@ -38,7 +40,7 @@ class LazyCommands(Mapping[str, Any]):
         """A command; KeyError where there is none."""
         if name not in self._loaded:
             word = self.words[name]
-            module, _, attribute = word.place.partition(":")
+            module, _colon, attribute = word.place.partition(":")
             self._loaded[name] = command_of(name, getattr(import_module(f"{__package__}.{module}"), attribute))
             self._finish(self._loaded[name])
         return self._loaded[name]
@@ -54,25 +56,43 @@ class LazyCommands(Mapping[str, Any]):
 
 def command_of(name: str, source: Callable[..., None] | typer.Typer) -> Any:
     """The command of a function, or the group of an application of typer."""
+    command: Any
     if isinstance(source, typer.Typer):
-        group = get_group_from_info(
+        command = get_group_from_info(
             TyperInfo(source, name=name), suggest_commands=True, pretty_exceptions_short=False, rich_markup_mode=None
         )
-        _list_once(group, group.params)
-        return group
-    return get_command_from_info(
-        CommandInfo(name, callback=source), pretty_exceptions_short=False, rich_markup_mode=None
-    )
+        _list_once(command, name, command.params)
+    else:
+        command = get_command_from_info(
+            CommandInfo(name, callback=source), pretty_exceptions_short=False, rich_markup_mode=None
+        )
+    _with_numbers(command)
+    return command
 
 
-def _list_once(group: Any, options: Sequence[Any]) -> None:
-    """Hide options of commands that their group lists."""
-    listed = [(option.name, option.opts) for option in options]
+def _with_numbers(command: Any) -> None:
+    """Let N stand for a number in help, where nothing else does."""
+    for option in command.params:
+        if option.metavar is None and str(getattr(option.type, "name", "")).startswith(("int", "float")):
+            option.metavar = "N"
+    for inner in getattr(command, "commands", {}).values():
+        _with_numbers(inner)
+
+
+def _list_once(group: Any, name: str, options: Sequence[Any]) -> None:
+    """Hide options of commands that their group lists; the help of a command names them."""
+    listed = {(option.name, *option.opts) for option in options}
     for command in group.commands.values():
-        for option in command.params:
-            option.hidden = getattr(option, "hidden", False) or (option.name, option.opts) in listed
+        hidden = [option for option in command.params if (option.name, *option.opts) in listed]
+        for option in hidden:
+            option.hidden = True
+        if hidden and not command.epilog:
+            words = ", ".join(option.opts[-1] for option in hidden)
+            command.epilog = _(
+                "`sprag {group} --help` explains its further options: {options}", group=name, options=words
+            )
         if hasattr(command, "commands"):
-            _list_once(command, options)
+            _list_once(command, name, options)
 
 
 class Groups(TyperGroup):
@@ -118,7 +138,7 @@ def common_first(line: Sequence[str]) -> tuple[list[str], list[str]]:
     rest: list[str] = []
     words = iter(line)
     for word in words:
-        name, equals, _ = word.partition("=")
+        name, equals, _value = word.partition("=")
         if word == "--":
             rest += [word, *words]
         elif name in _ANYWHERE or (not rest and word.startswith("-")):

@@ -68,6 +68,8 @@ _REFUSALS: Final = tuple(
         ),
     )
 )
+#: How typer says that a text is no number.
+_NUMBER: Final = re.compile(r"is not a valid (int|float)(?: range)?\.\Z")
 
 
 def chosen(arguments: Sequence[str], environment: Mapping[str, str]) -> str:
@@ -162,9 +164,9 @@ def _with_remarks(text: str) -> str:
 
 
 def refusal(message: str) -> str:
-    """A refusal of a command line by typer in the language of the task."""
+    """A refusal of a command line by typer in the language of the task; in English that of a number is reworded."""
     if languages.current() == ENGLISH:
-        return message
+        return _NUMBER.sub(lambda kind: f"is not a {'whole ' if kind[1] == 'int' else ''}number.", message)
     for pattern, text in _REFUSALS:
         if found := pattern.fullmatch(message):
             return _(text, **cast("dict[str, object]", found.groupdict()))

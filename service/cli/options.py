@@ -21,7 +21,10 @@ class ValueFormat(StrEnum):
     JSON = "json"
 
 
-SpecFile = Annotated[str, typer.Argument(metavar="SPEC", help="Study spec, JSON or TOML; - reads standard input.")]
+SpecFile = Annotated[
+    str,
+    typer.Argument(metavar="SPEC", help="Study spec, JSON or TOML, or the name of a preset; - reads standard input."),
+]
 PointsFile = Annotated[
     str | None,
     typer.Option(

@@ -108,12 +108,12 @@ def refusal(error: RefusedError) -> CommandFailureError:
         return TroubleError(
             kind,
             _(
-                "{refusal} Give the service's token with --token or in SPRAG_TOKEN.",
-                refusal=earlier.said(_(str(error))),
+                "{refusal} Give the service's token with --token or in SPRAG_TOKEN, or keep it with `sprag login`.",
+                refusal=earlier.said(_(error.detail)),
             ),
         )
     if error.status in (403, 421) or error.status >= 500:
-        return TroubleError(kind, str(error))
+        return TroubleError(kind, error.detail)
     faults = [
         Fault(
             _option(fault.where) if fault.place == "parameter" else fault.where,
@@ -126,7 +126,7 @@ def refusal(error: RefusedError) -> CommandFailureError:
         for fault in error.faults
     ]
     title = error.problem.get("title")
-    return WrongInputError(kind, str(title) if faults and title else str(error), faults)
+    return WrongInputError(kind, str(title) if faults and title else error.detail, faults)
 
 
 def _option(parameter: object) -> str:

@@ -40,7 +40,10 @@ def _cells(row: EffectiveSetting) -> tuple[str, ...]:
 
 
 def settings() -> None:
-    """Show the settings that apply here, each with its origin: a variable of the environment, a file, the default."""
+    """Show the settings that apply here, each with its origin: a variable of the environment, a file, the default.
+
+    The variable of a setting is its name in capitals after SPRAG_, such as SPRAG_PORT; SPRAG_SETTINGS names a file.
+    """
     found = read_settings()
     from sprag_study.service.settings import effective
 

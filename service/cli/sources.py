@@ -9,22 +9,24 @@ import typer
 
 from sprag_study.service.cli import completion
 from sprag_study.service.cli.console import wrong_option
+from sprag_study.service.cli.files import is_preset
 from sprag_study.service.languages import N_
 
 SpecOrStudy = Annotated[
     str,
     typer.Argument(
         metavar="SPEC|ID",
-        help="Study spec, JSON or TOML, which is run here (- reads standard input); or a study of a running service.",
+        help="Study spec, JSON or TOML, or a preset, which is run here (- reads standard input); or a study of a "
+        "running service.",
         autocompletion=completion.studies,
     ),
 ]
 
 
 def is_study(spec: str) -> bool:
-    """Whether an argument names a study of a service: it is no file, and not called like a spec."""
+    """Whether an argument names a study of a service: it is neither a file nor a preset, and not called like a spec."""
     path = Path(spec)
-    return spec != "-" and path.suffix.lower() not in (".json", ".toml") and not path.is_file()
+    return not (spec == "-" or path.suffix.lower() in (".json", ".toml") or path.is_file() or is_preset(spec))
 
 
 def refuse_local(**given: Any) -> None:

@@ -109,6 +109,7 @@ def _function_of(command: Command) -> Callable[..., None]:
     ) -> None:  # fmt: skip
         form = None if file is None else file_format(file, _FORMATS)
         require_csv(None, decimal, form)
+        _require_file(form, units, language)
         if settings.get("quantiles"):
             settings["quantiles"] = list(map(_probability, settings["quantiles"]))
         whole, most = settings, None
@@ -143,6 +144,14 @@ def _function_of(command: Command) -> Callable[..., None]:
     own += [parameter("measured", _Measured, None)] if about is questions.CALIBRATION else []
     shared = [parameter(name, SHARED[name], None) for name in _SHARED]
     return signed(run, about.summary, [parameter("study", SpecOrStudy, ...), *own, *shared])
+
+
+def _require_file(form: str | None, units: str | None, language: str | None) -> None:
+    """Refuse what applies to a file, or to a picture, where none is written; WrongInputError."""
+    if units is not None and form is None:
+        raise wrong_option("--units", "not-used", N_("only a file has them"), units, allowed=_("with --output FILE"))
+    if language is not None and form not in PICTURES:
+        raise wrong_option("--language", "not-used", N_("only pictures have it"), language, allowed=", ".join(PICTURES))
 
 
 def _with_measured(file: str, spec: object) -> object:

@@ -87,6 +87,10 @@ class RefusedError(ServiceError):
         detail = str(self.problem.get("detail") or self.problem.get("title") or f"HTTP status {status}")
         super().__init__(cast("Kind", kind), detail, map(_fault, self.errors))
 
+    def __str__(self) -> str:
+        """Each fault of the input in a line, or what the service says."""
+        return "\n".join(map(str, self.faults)) or self.detail
+
     @property
     def errors(self) -> list[dict[str, Any]]:
         """Faults of the input, each with pointer, message, value and allowed range where known."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -19,11 +20,15 @@ def quantity_text(number: float, unit: str) -> str:
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> Sentence:
-    """ "; did you mean 'x'?" for the known word closest to ``word``, or an empty phrase where none is close."""
+    """ "; did you mean 'x'?" for the known word closest to ``word``, or an empty phrase where none is close.
+
+    The first name of which ``word`` is a part is closest: "spring_rate" for "spring", "shaft.speed.mean" for "speed".
+    """
     if len(word) > 2 * _LONGEST_TEXT:
         return Sentence("")
     by_lower = {name.lower(): name for name in known}
-    near = difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=0.6)
+    near = [name for name in by_lower if word.lower() in re.split(r"[._]", name)]
+    near = near or difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=0.6)
     return Sentence("; did you mean '{word}'?", word=by_lower[near[0]]) if near else Sentence("")
 
 

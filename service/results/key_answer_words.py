@@ -47,7 +47,11 @@ def _missing(found: AnswerFacts, x_unit: str) -> Phrase:
     if found["x"] is None:
         return Phrase("no case there") if why == "no-case" else Phrase("0 in all cases")
     x = Amount(found["x"], x_unit)
-    return Phrase("no case at {x}", x=x) if why == "no-case" else Phrase("{x} is outside the cases", x=x)
+    return (
+        Phrase("no case at {x}", x=x)
+        if why == "no-case"
+        else Phrase("{x} is outside the cases that have this result", x=x)
+    )
 
 
 def _between(found: AnswerFacts, x_unit: str) -> Phrase:

@@ -278,7 +278,6 @@ TRAJECTORY: Final = ViewInfo(
     "trajectory",
     TrajectoryQuestion,
     "Compute every variable, torque, power and state of one case over time, or over the angle.",
-    pictures=False,
     leading=2,
     title=N_("Motion"),
 )

@@ -109,7 +109,7 @@ class TrajectoryView(CaseView[TrajectoryQuestion, tuple[float, float, int], Traj
     """The motion of a case over time, or over the angle."""
 
     about = TRAJECTORY
-    content = "Instantaneous values, as JSON or CSV."
+    content = "Instantaneous values, as JSON, a table or a picture."
     shape = TrajectoryData | AngleTable
 
     def choose(self, study: Study, case: int, question: TrajectoryQuestion) -> tuple[float, float, int]:

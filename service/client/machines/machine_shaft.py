@@ -13,7 +13,20 @@ from sprag_study.service.client.machines.studies import Studies
 
 
 class ShaftDriveMotor(TypedDict, total=False):
-    """A motor whose torque depends on its speed."""
+    """A motor whose torque depends on its speed.
+
+    kind : Kind of the motor.
+    no_load_speed : Speed at which its torque is 0 (w_0), rad/s; > 0 rad/s and <= 1e+06 rad/s.
+    stall_torque : Its torque at rest (M_0), N*m; > 0 N*m and <= 1e+12 N*m.
+    inertia : Inertia of its rotor (J_m), kg*m^2; >= 0 kg*m^2 and <= 1e+12 kg*m^2.
+    synchronous_speed : Its synchronous speed (w_s), rad/s; > 0 rad/s and <= 1e+06 rad/s.
+    breakdown_torque : Its largest torque (M_k), N*m; > 0 N*m and <= 1e+12 N*m.
+    breakdown_slip : Slip at its largest torque (s_k); > 0 and <= 1000.
+    scale : Factor on the torques of its table (k_m); > 0 and <= 1e+12.
+    table : Rows of speed (rad/s) and torque (N*m).
+    csv : Speed (rad/s) and torque (N*m) as the text of a CSV file, headings with units in brackets.
+    interpolation : How rows of the table are joined: without overshoot, or by straight lines.
+    """
 
     kind: Literal["linear", "kloss", "table"]
     no_load_speed: Quantity
@@ -29,7 +42,19 @@ class ShaftDriveMotor(TypedDict, total=False):
 
 
 class ShaftDriveStage(TypedDict, total=False):
-    """Fields of stage."""
+    """Fields of stage.
+
+    kind : Kind of the stage.
+    ratio : Speed of its input shaft over that of its output (u); > 0 and <= 1e+06.
+    efficiency : Power given over power taken (eta); > 0 and <= 1.
+    output_inertia : Inertia that turns with the stage's output shaft (J_2), kg*m^2; >= 0 kg*m^2 and <= 1e+12 kg*m^2.
+    inertia : Inertia that turns with the stage's input shaft (J_1), kg*m^2; >= 0 kg*m^2 and <= 1e+12 kg*m^2.
+    mass : Mass that the stage moves: of the belt or chain, or what goes with the nut or rack (m), kg; >= 0 kg and <=
+        1e+09 kg.
+    radius : Radius of the driving pulley or sprocket, or of the rack's pinion; required for a rack (r), m; >= 0 m and
+        <= 1000 m.
+    lead : Way of the nut in a revolution of the screw (p), m; > 0 m and <= 1000 m.
+    """
 
     kind: Literal["gear", "belt", "chain", "worm", "screw_nut", "rack"]
     ratio: Quantity
@@ -42,7 +67,15 @@ class ShaftDriveStage(TypedDict, total=False):
 
 
 class ShaftDriveFlywheel(TypedDict, total=False):
-    """A flywheel on the main shaft, given by its dimensions."""
+    """A flywheel on the main shaft, given by its dimensions.
+
+    kind : Shape of the flywheel: a thin rim or a solid disc.
+    diameter : Mean diameter of the rim, or outer diameter of the disc (D), m; > 0 m and <= 1000 m.
+    mass : Mass of the rim or disc (m), kg; > 0 kg and <= 1e+09 kg.
+    density : Density of its material (rho), kg/m^3; > 0 kg/m^3 and <= 100000 kg/m^3.
+    poisson_ratio : Poisson's ratio of its material (nu); >= 0 and <= 0.5.
+    allowed_stress : Stress that determines its margin (s_a), Pa; > 0 Pa and <= 1e+12 Pa.
+    """
 
     kind: Literal["rim", "disc"]
     diameter: Quantity
@@ -53,7 +86,19 @@ class ShaftDriveFlywheel(TypedDict, total=False):
 
 
 class ShaftDrive(TypedDict, total=False):
-    """What turns the shaft."""
+    """What turns the shaft.
+
+    inertia : Inertia that turns with the shaft; required without stages and flywheel (I'), kg*m^2; >= 0 kg*m^2 and <=
+        1e+12 kg*m^2.
+    torque : Driving torque; at the motor where there are stages (M_d), N*m; >= -1e+30 N*m and <= 1e+30 N*m.
+    scale : Factor on the driving torque (k_d); >= -1e+30 and <= 1e+30.
+    motor : A motor whose torque depends on its speed; fields kind, no_load_speed, stall_torque, inertia,
+        synchronous_speed, breakdown_torque, breakdown_slip, scale, table, csv, interpolation; needed: kind.
+    stages : Stages between motor and main shaft, motor first; fields kind, ratio, efficiency, output_inertia, inertia,
+        mass, radius, lead; needed: kind.
+    flywheel : A flywheel on the main shaft, given by its dimensions; fields kind, diameter, mass, density,
+        poisson_ratio, allowed_stress; needed: kind, diameter, mass.
+    """
 
     inertia: Quantity
     torque: Quantity
@@ -64,7 +109,19 @@ class ShaftDrive(TypedDict, total=False):
 
 
 class ShaftMechanismSliderCrank(TypedDict, total=False):
-    """Fields of slider_crank."""
+    """Fields of slider_crank.
+
+    weights : Whether the ram alone has a weight, or rods, couplers and blocks too.
+    bodies : Rods and couplers as full bodies, or as two masses on their pins.
+    crank : Length of the crank (r), m; > 0 m and <= 1000 m.
+    rod : Length of the connecting rod (L), m; > 0 m and <= 1000 m.
+    offset : Height of the ram's line above its crank's centre (e), m; >= -1000 m and <= 1000 m.
+    rod_centre : Crank pin to the rod's centre of mass (s), m; >= -1000 m and <= 1000 m.
+    rod_mass : Mass of the rod (m2), kg; >= 0 kg and <= 1e+09 kg.
+    rod_inertia : Inertia of the rod about its centre of mass (J2), kg*m^2; >= 0 kg*m^2 and <= 1e+12 kg*m^2.
+    ram_mass : Mass of the ram (m3), kg; >= 0 kg and <= 1e+09 kg.
+    inclination : Rise of the forward stroke above the level (beta), rad; >= -6.28319 rad and <= 6.28319 rad.
+    """
 
     weights: Literal["ram", "all"]
     bodies: Literal["full", "two_mass"]
@@ -79,7 +136,22 @@ class ShaftMechanismSliderCrank(TypedDict, total=False):
 
 
 class ShaftMechanismFourBar(TypedDict, total=False):
-    """Fields of four_bar."""
+    """Fields of four_bar.
+
+    weights : Whether the ram alone has a weight, or rods, couplers and blocks too.
+    bodies : Rods and couplers as full bodies, or as two masses on their pins.
+    frame : Distance of the fixed pivots (d), m; > 0 m and <= 1000 m.
+    crank : Length of the crank (a), m; > 0 m and <= 1000 m.
+    coupler : Length of the coupler (b), m; > 0 m and <= 1000 m.
+    rocker : Length of the rocker (c), m; > 0 m and <= 1000 m.
+    coupler_centre : Crank pin to its centre of mass (s), m; >= -1000 m and <= 1000 m.
+    coupler_mass : Mass of the coupler (m2), kg; >= 0 kg and <= 1e+09 kg.
+    coupler_inertia : Inertia of the coupler about its centre of mass (J2), kg*m^2; >= 0 kg*m^2 and <= 1e+12 kg*m^2.
+    rocker_inertia : Inertia of the rocker about its pivot (J3), kg*m^2; >= 0 kg*m^2 and <= 1e+12 kg*m^2.
+    tray_mass : Mass carried along the arc of the rocker's pin (m4), kg; >= 0 kg and <= 1e+09 kg.
+    inclination : Rise of the frame above the level, from the shaft to the rocker's pivot; with `weights` "all" (beta),
+        rad; >= -6.28319 rad and <= 6.28319 rad.
+    """
 
     weights: Literal["ram", "all"]
     bodies: Literal["full", "two_mass"]
@@ -96,7 +168,30 @@ class ShaftMechanismFourBar(TypedDict, total=False):
 
 
 class ShaftMechanismDragLink(TypedDict, total=False):
-    """Fields of drag_link."""
+    """Fields of drag_link.
+
+    weights : Whether the ram alone has a weight, or rods, couplers and blocks too.
+    bodies : Rods and couplers as full bodies, or as two masses on their pins.
+    frame : Distance of the fixed pivots (d), m; > 0 m and <= 1000 m.
+    frame_angle : Direction of the follower's pivot from the far side (beta_0), rad; >= -6.28319 rad and <= 6.28319 rad.
+    crank : Length of the crank (a), m; > 0 m and <= 1000 m.
+    coupler : Length of the coupler (b), m; > 0 m and <= 1000 m.
+    coupler_centre : Crank pin to its centre of mass (s_2), m; >= -1000 m and <= 1000 m.
+    coupler_mass : Mass of the coupler (m_2), kg; >= 0 kg and <= 1e+09 kg.
+    coupler_inertia : Inertia of the coupler about its centre of mass (J_2), kg*m^2; >= 0 kg*m^2 and <= 1e+12 kg*m^2.
+    follower : Follower's pivot to the coupler's pin (c), m; > 0 m and <= 1000 m.
+    arm : Follower's pivot to the rod's pin (R), m; > 0 m and <= 1000 m.
+    arm_angle : Angle by which the rod's pin is ahead of the coupler's (beta_1), rad; >= -6.28319 rad and <= 6.28319
+        rad.
+    follower_inertia : Inertia of the follower about its pivot (J_3), kg*m^2; >= 0 kg*m^2 and <= 1e+12 kg*m^2.
+    rod : Length of the connecting rod (L), m; > 0 m and <= 1000 m.
+    offset : Height of the ram's line above its crank's centre (e), m; >= -1000 m and <= 1000 m.
+    rod_centre : Crank pin to the rod's centre of mass (s), m; >= -1000 m and <= 1000 m.
+    rod_mass : Mass of the rod (m2), kg; >= 0 kg and <= 1e+09 kg.
+    rod_inertia : Inertia of the rod about its centre of mass (J2), kg*m^2; >= 0 kg*m^2 and <= 1e+12 kg*m^2.
+    ram_mass : Mass of the ram (m3), kg; >= 0 kg and <= 1e+09 kg.
+    inclination : Rise of the forward stroke above the level (beta), rad; >= -6.28319 rad and <= 6.28319 rad.
+    """
 
     weights: Literal["ram", "all"]
     bodies: Literal["full", "two_mass"]
@@ -121,7 +216,27 @@ class ShaftMechanismDragLink(TypedDict, total=False):
 
 
 class ShaftMechanismToggle(TypedDict, total=False):
-    """Fields of toggle."""
+    """Fields of toggle.
+
+    weights : Whether the ram alone has a weight, or rods, couplers and blocks too.
+    bodies : Rods and couplers as full bodies, or as two masses on their pins.
+    frame : Distance of the fixed pivots (d), m; > 0 m and <= 1000 m.
+    crank : Length of the crank (a), m; > 0 m and <= 1000 m.
+    coupler : Length of the coupler (b), m; > 0 m and <= 1000 m.
+    coupler_centre : Crank pin to its centre of mass (s_2), m; >= -1000 m and <= 1000 m.
+    coupler_mass : Mass of the coupler (m_2), kg; >= 0 kg and <= 1e+09 kg.
+    coupler_inertia : Inertia of the coupler about its centre of mass (J_2), kg*m^2; >= 0 kg*m^2 and <= 1e+12 kg*m^2.
+    rocker : Length of the rocker (c), m; > 0 m and <= 1000 m.
+    line_angle : Direction of the ram's line from the frame beyond the pivot (lambda), rad; >= -6.28319 rad and <=
+        6.28319 rad.
+    rocker_inertia : Inertia of the rocker about its pivot (J_3), kg*m^2; >= 0 kg*m^2 and <= 1e+12 kg*m^2.
+    rod : Length of the connecting rod (L), m; > 0 m and <= 1000 m.
+    rod_centre : Crank pin to the rod's centre of mass (s), m; >= -1000 m and <= 1000 m.
+    rod_mass : Mass of the rod (m2), kg; >= 0 kg and <= 1e+09 kg.
+    rod_inertia : Inertia of the rod about its centre of mass (J2), kg*m^2; >= 0 kg*m^2 and <= 1e+12 kg*m^2.
+    ram_mass : Mass of the ram (m3), kg; >= 0 kg and <= 1e+09 kg.
+    inclination : Rise of the forward stroke above the level (beta), rad; >= -6.28319 rad and <= 6.28319 rad.
+    """
 
     weights: Literal["ram", "all"]
     bodies: Literal["full", "two_mass"]
@@ -143,7 +258,13 @@ class ShaftMechanismToggle(TypedDict, total=False):
 
 
 class ShaftMechanismScotchYoke(TypedDict, total=False):
-    """Fields of scotch_yoke."""
+    """Fields of scotch_yoke.
+
+    crank : Length of the crank (r), m; > 0 m and <= 1000 m.
+    yoke_mass : Mass of the yoke and what slides with it (m), kg; >= 0 kg and <= 1e+09 kg.
+    block_mass : Mass of the sliding block on the crank pin (m_b), kg; >= 0 kg and <= 1e+09 kg.
+    inclination : Rise of the forward stroke above the level (beta), rad; >= -6.28319 rad and <= 6.28319 rad.
+    """
 
     crank: Quantity
     yoke_mass: Quantity
@@ -152,7 +273,13 @@ class ShaftMechanismScotchYoke(TypedDict, total=False):
 
 
 class ShaftMechanismParallelCrank(TypedDict, total=False):
-    """Fields of parallel_crank."""
+    """Fields of parallel_crank.
+
+    crank : Length of both cranks (r), m; > 0 m and <= 1000 m.
+    coupler_mass : Mass of the coupler and what goes round with it (m), kg; >= 0 kg and <= 1e+09 kg.
+    driven_inertia : Inertia of the second crank about its pivot (J_3), kg*m^2; >= 0 kg*m^2 and <= 1e+12 kg*m^2.
+    inclination : Rise of the forward stroke above the level (beta), rad; >= -6.28319 rad and <= 6.28319 rad.
+    """
 
     crank: Quantity
     coupler_mass: Quantity
@@ -161,7 +288,24 @@ class ShaftMechanismParallelCrank(TypedDict, total=False):
 
 
 class ShaftMechanismQuickReturn(TypedDict, total=False):
-    """Fields of quick_return."""
+    """Fields of quick_return.
+
+    kind : Kind of the quick return.
+    weights : Whether the ram alone has a weight, or rods, couplers and blocks too.
+    bodies : Rods and couplers as full bodies, or as two masses on their pins.
+    crank : Length of the crank (r), m; > 0 m and <= 1000 m.
+    pivot_distance : Distance of the link's pivot below the shaft (d), m; > 0 m and <= 1000 m.
+    link_arm : Link's pivot to the rod's pin (R), m; > 0 m and <= 1000 m.
+    rod : Length of the connecting rod (L), m; > 0 m and <= 1000 m.
+    offset : Height of the ram's line above its crank's centre (e), m; >= -1000 m and <= 1000 m.
+    rod_centre : Crank pin to the rod's centre of mass (s), m; >= -1000 m and <= 1000 m.
+    rod_mass : Mass of the rod (m2), kg; >= 0 kg and <= 1e+09 kg.
+    rod_inertia : Inertia of the rod about its centre of mass (J2), kg*m^2; >= 0 kg*m^2 and <= 1e+12 kg*m^2.
+    ram_mass : Mass of the ram (m3), kg; >= 0 kg and <= 1e+09 kg.
+    inclination : Rise of the forward stroke above the level (beta), rad; >= -6.28319 rad and <= 6.28319 rad.
+    link_inertia : Inertia of the slotted link about its pivot (J_l), kg*m^2; >= 0 kg*m^2 and <= 1e+12 kg*m^2.
+    block_mass : Mass of the sliding block on the crank pin (m_b), kg; >= 0 kg and <= 1e+09 kg.
+    """
 
     kind: Literal["crank_shaper", "whitworth"]
     weights: Literal["ram", "all"]
@@ -181,7 +325,20 @@ class ShaftMechanismQuickReturn(TypedDict, total=False):
 
 
 class ShaftMechanismCam(TypedDict, total=False):
-    """Fields of cam."""
+    """Fields of cam.
+
+    rise : Law of the rise.
+    fall : Law of the fall.
+    lift : Lift of the follower (h), m; > 0 m and <= 1000 m.
+    start : Angle at which the rise begins (phi_0), rad; >= 0 rad and <= 6.28319 rad.
+    rise_angle : Angle of the rise (beta_1), rad; > 0 rad and <= 6.28319 rad.
+    dwell_angle : Angle of the upper dwell (beta_2), rad; >= 0 rad and <= 6.28319 rad.
+    fall_angle : Angle of the fall (beta_3), rad; > 0 rad and <= 6.28319 rad.
+    follower_mass : Mass of the follower (m), kg; >= 0 kg and <= 1e+09 kg.
+    spring_rate : Rate of the follower's spring (c), N/m; >= 0 N/m and <= 1e+12 N/m.
+    spring_preload : Its force at no lift (F_0), N; >= 0 N and <= 1e+12 N.
+    inclination : Rise of the forward stroke above the level (beta), rad; >= -6.28319 rad and <= 6.28319 rad.
+    """
 
     rise: Literal["cycloidal", "polynomial_345"]
     fall: Literal["cycloidal", "polynomial_345"]
@@ -197,7 +354,30 @@ class ShaftMechanismCam(TypedDict, total=False):
 
 
 class ShaftMechanism(TypedDict, total=False):
-    """What the shaft drives: a table, a formula, or dimensions and masses."""
+    """What the shaft drives: a table, a formula, or dimensions and masses.
+
+    table : Rows of angle (rad) and reduced inertia (kg*m^2).
+    csv : Angle (rad) and reduced inertia (kg*m^2) as the text of a CSV file, headings with units in brackets.
+    formula : Reduced inertia in kg*m^2 as a formula of phi (rad).
+    slider_crank : Fields weights, bodies, crank, rod, offset, rod_centre, rod_mass, rod_inertia, ram_mass, inclination;
+        needed: crank, rod.
+    four_bar : Fields weights, bodies, frame, crank, coupler, rocker, coupler_centre, coupler_mass, coupler_inertia,
+        rocker_inertia, tray_mass, inclination; needed: frame, crank, coupler, rocker.
+    drag_link : Fields weights, bodies, frame, frame_angle, crank, coupler, coupler_centre, coupler_mass,
+        coupler_inertia, follower, arm, arm_angle, follower_inertia, rod, offset, rod_centre, rod_mass, rod_inertia,
+        ram_mass, inclination; needed: frame, crank, coupler, follower, arm, rod.
+    toggle : Fields weights, bodies, frame, crank, coupler, coupler_centre, coupler_mass, coupler_inertia, rocker,
+        line_angle, rocker_inertia, rod, rod_centre, rod_mass, rod_inertia, ram_mass, inclination; needed: frame, crank,
+        coupler, rocker, rod.
+    scotch_yoke : Fields crank, yoke_mass, block_mass, inclination; needed: crank.
+    parallel_crank : Fields crank, coupler_mass, driven_inertia, inclination; needed: crank.
+    quick_return : Fields kind, weights, bodies, crank, pivot_distance, link_arm, rod, offset, rod_centre, rod_mass,
+        rod_inertia, ram_mass, inclination, link_inertia, block_mass; needed: kind, crank, pivot_distance, link_arm,
+        rod.
+    cam : Fields rise, fall, lift, start, rise_angle, dwell_angle, fall_angle, follower_mass, spring_rate,
+        spring_preload, inclination; needed: lift, rise_angle, fall_angle.
+    interpolation : How rows of the table are joined: without overshoot, or by straight lines.
+    """
 
     table: Sequence[Sequence[Quantity]]
     csv: str
@@ -214,7 +394,15 @@ class ShaftMechanism(TypedDict, total=False):
 
 
 class ShaftOperationGas(TypedDict, total=False):
-    """A gas drawn in and compressed by the working part."""
+    """A gas drawn in and compressed by the working part.
+
+    piston_area : Area of the piston (A), m^2; > 0 m^2 and <= 1e+06 m^2.
+    suction_pressure : Absolute pressure of suction (p_1), Pa; > 0 Pa and <= 1e+12 Pa.
+    discharge_pressure : Absolute pressure of discharge (p_2), Pa; > 0 Pa and <= 1e+12 Pa.
+    back_pressure : Pressure on the piston's back (p_0), Pa; >= 0 Pa and <= 1e+12 Pa.
+    clearance : Clearance volume over displaced volume (c); >= 0 and <= 10.
+    exponent : Exponent of compression and expansion (n); >= 0.001 and <= 10.
+    """
 
     piston_area: Quantity
     suction_pressure: Quantity
@@ -225,7 +413,17 @@ class ShaftOperationGas(TypedDict, total=False):
 
 
 class ShaftOperationIndicator(TypedDict, total=False):
-    """The pressure on the piston as measured."""
+    """The pressure on the piston as measured.
+
+    over : Against the shaft's angle, or the volume as fraction of the stroke, or recorded over time.
+    recorded_at : Mean speed of the shaft while the diagram was recorded over time, rad/s; > 0 rad/s and <= 1e+06 rad/s.
+    table : Rows of angle (rad), fraction of the stroke, to and fro in every revolution, or time (s), and pressure (Pa).
+    csv : Angle (rad), fraction of the stroke, to and fro in every revolution, or time (s), and pressure (Pa) as the
+        text of a CSV file, headings with units in brackets.
+    interpolation : How rows of the table are joined: without overshoot, or by straight lines.
+    piston_area : Area of the piston (A), m^2; > 0 m^2 and <= 1e+06 m^2.
+    back_pressure : Pressure on the piston's back (p_0), Pa; >= 0 Pa and <= 1e+12 Pa.
+    """
 
     over: Literal["angle", "stroke", "time"]
     recorded_at: Quantity
@@ -237,7 +435,27 @@ class ShaftOperationIndicator(TypedDict, total=False):
 
 
 class ShaftOperation(TypedDict, total=False):
-    """What resists."""
+    """What resists.
+
+    value : Resistance, the same at every angle; N*m for a torque (F), N; >= -1e+30 N and <= 1e+30 N.
+    steps : Constant pieces; zero elsewhere; fields from, to, value.
+    table : Rows of angle (rad), fraction of the stroke or time (s), and force (N) or torque (N*m).
+    csv : Angle (rad), fraction of the stroke or time (s), and force (N) or torque (N*m) as the text of a CSV file,
+        headings with units in brackets.
+    formula : Force or torque as a formula of phi (rad), t (s), x (fraction of the stroke) and omega (rad/s).
+    gas : A gas drawn in and compressed by the working part; fields piston_area, suction_pressure, discharge_pressure,
+        back_pressure, clearance, exponent; needed: piston_area, suction_pressure, discharge_pressure.
+    indicator : The pressure on the piston as measured; fields over, recorded_at, table, csv, interpolation,
+        piston_area, back_pressure; needed: piston_area.
+    quantity : A force on the working part, or a torque on the shaft.
+    over : Against the shaft's angle, or the fraction of the stroke, or recorded over time.
+    during : Strokes in which a diagram over the stroke holds.
+    sense : A force against the motion, or always against the forward stroke.
+    interpolation : How rows of the table are joined: without overshoot, or by straight lines.
+    scale : Factor on the whole diagram (k); >= -1e+30 and <= 1e+30.
+    efficiency : Power given over power taken between the shaft and the operation (eta); > 0 and <= 1.
+    recorded_at : Mean speed of the shaft while the diagram was recorded over time, rad/s; > 0 rad/s and <= 1e+06 rad/s.
+    """
 
     value: Quantity
     steps: Sequence[Mapping[str, Any]]
@@ -257,7 +475,14 @@ class ShaftOperation(TypedDict, total=False):
 
 
 class ShaftPart(TypedDict, total=False):
-    """A mechanism with its operation; their angle is that of the shaft plus the crank angle."""
+    """A mechanism with its operation; their angle is that of the shaft plus the crank angle.
+
+    crank_angle : Angle of the part's crank at the shaft's angle 0 (alpha), rad; >= -100 rad and <= 100 rad.
+    mechanism : What the shaft drives: a table, a formula, or dimensions and masses; fields table, csv, formula,
+        slider_crank, four_bar, drag_link, toggle, scotch_yoke, parallel_crank, quick_return, cam, interpolation.
+    operation : What resists; fields value, steps, table, csv, formula, gas, indicator, quantity, over, during, sense,
+        interpolation, scale, efficiency, recorded_at.
+    """
 
     crank_angle: Quantity
     mechanism: ShaftMechanism
@@ -516,7 +741,7 @@ class Shaft(Studies):
         Parameters
         ----------
         drive : values
-            What turns the shaft.
+            What turns the shaft; fields inertia, torque, scale, motor, stages, flywheel.
         cycle : values, optional
             Revolutions of a cycle, 1 to 12.
         mean_speed : number or text with a unit, optional
@@ -524,11 +749,14 @@ class Shaft(Studies):
         mean_speed_is : values, optional
             Which mean of the speed the given mean speed and the irregularity refer to.
         mechanism : values, optional
-            What the shaft drives: a table, a formula, or dimensions and masses.
+            What the shaft drives: a table, a formula, or dimensions and masses; fields table, csv, formula,
+            slider_crank, four_bar, drag_link, toggle, scotch_yoke, parallel_crank, quick_return, cam, interpolation.
         operation : values, optional
-            What resists.
+            What resists; fields value, steps, table, csv, formula, gas, indicator, quantity, over, during, sense,
+            interpolation, scale, efficiency, recorded_at.
         parts : values, optional
-            Several mechanisms on the shaft, each with its operation and at its crank angle.
+            Several mechanisms on the shaft, each with its operation and at its crank angle; fields crank_angle,
+            mechanism, operation.
         balance : values, optional
             What makes the work over a cycle zero; by default constant, refuse where a torque is given, motor where
             there is one.
@@ -539,7 +767,7 @@ class Shaft(Studies):
         constants : values, optional
             Numbers that formulas use by their names.
         wanted_irregularity : number or text with a unit, optional
-            Irregularity that determines the required inertia (delta), 1; > 0 and <= 2.
+            Irregularity that determines the required inertia (delta); > 0 and <= 2.
         friction_torque : number or text with a unit, optional
             Friction of the shaft, always resisting (M_f), N*m; >= 0 N*m and <= 1e+12 N*m.
         gravity : number or text with a unit, optional

@@ -66,7 +66,7 @@ class Studies(Draft):
         Parameters
         ----------
         vary : values
-            What may vary: over a range, or among listed values.
+            What may vary: over a range, or among listed values; fields path, from, to, values; needed: path.
         best : values, optional
             Results that are to be as small, or with max as large, as possible.
         subject_to : values, optional
@@ -112,8 +112,9 @@ class Studies(Draft):
         Parameters
         ----------
         unknown : values
-            What is unknown, each between two values.
+            What is unknown, each between two values; fields path, from, to.
         measured : values
+            Fields csv.
         loss : values, optional
             How much a large residual counts: linear (least squares), or less with the others.
         refits : int, optional
@@ -172,7 +173,8 @@ class Studies(Draft):
         exclude : values, optional
             Conditions by path; a case is left out when all parts of any one of them hold.
         tolerances : values, optional
-            What differs from one built drive to the next, and by how much.
+            What differs from one built drive to the next, and by how much; fields path, plus_minus, distribution,
+            values, shared; needed: path.
         drives : int, optional
             Drives that are drawn; the nominal one is added to them.
         seed : int, optional
@@ -181,7 +183,7 @@ class Studies(Draft):
             How drives are drawn: sobol (scrambled) and latin_hypercube fill the distributions evenly, random draws are
             independent.
         correlations : values, optional
-            Parameters whose draws depend on each other.
+            Parameters whose draws depend on each other; fields between, coefficient.
         """
         return self._with(
             name=name,

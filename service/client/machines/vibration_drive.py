@@ -13,7 +13,13 @@ from sprag_study.service.client.machines.studies import Studies
 
 
 class DriveExcitation(TypedDict, total=False):
-    """Fields of excitation."""
+    """Fields of excitation.
+
+    frequency : Frequency of the base vibration (nu/2pi), Hz; > 0 Hz and <= 100000 Hz.
+    amplitude_x : Horizontal amplitude of the base (d), m; >= 0 m and <= 10 m.
+    amplitude_y : Vertical amplitude of the base (b), m; >= 0 m and <= 10 m.
+    phase : Phase of the vertical against the horizontal (chi), rad; >= -1000 rad and <= 1000 rad.
+    """
 
     frequency: Quantity
     amplitude_x: Quantity
@@ -22,7 +28,22 @@ class DriveExcitation(TypedDict, total=False):
 
 
 class DrivePendulum(TypedDict, total=False):
-    """Fields of pendulum."""
+    """Fields of pendulum.
+
+    inertia : Inertia about the axis (J), kg*m^2; > 0 kg*m^2 and <= 1e+06 kg*m^2.
+    mass : Mass (M), kg; >= 0 kg and <= 1e+06 kg.
+    arm : Axis to centre of mass; negative: hangs down (l), m; >= -1000 m and <= 1000 m.
+    spring_rate : Rate of the centring spring (c), N/m; >= 0 N/m and <= 1e+12 N/m.
+    spring_arm : Arm of the centring spring (a), m; >= -1000 m and <= 1000 m.
+    damping : Viscous damping (lambda), N*m*s/rad; >= 0 N*m*s/rad and <= 1e+06 N*m*s/rad.
+    backlash : Backlash of the freewheel (delta), rad; >= 0 rad and <= 1000 rad.
+    initial_angle : Angle at t = 0 (phi(0)), rad; >= -1000 rad and <= 1000 rad.
+    initial_speed : Angular speed at t = 0 (phi'(0)), rad/s; >= -1e+06 rad/s and <= 1e+06 rad/s.
+    initial_windup : Windup of its clutch at t = 0; of no effect where the clutch is free (u(0)), rad; >= -1000 rad and
+        <= 1e+06 rad.
+    initial_clutch : State of its clutch at t = 0: 0 free, 1 take up, 2 engaged, 3 beyond, 4 locked; >= 0 and <= 4.
+    clutch : Torque of the freewheel clutch over its windup.
+    """
 
     inertia: Quantity
     mass: Quantity
@@ -41,7 +62,12 @@ class DrivePendulum(TypedDict, total=False):
 
 
 class DriveShaft(TypedDict, total=False):
-    """Fields of shaft."""
+    """Fields of shaft.
+
+    inertia : Reduced inertia of the driven side (J_e), kg*m^2; > 0 kg*m^2 and <= 1e+06 kg*m^2.
+    load : Load torque, which resists rotation only (M_c), N*m; >= 0 N*m and <= 1e+09 N*m.
+    initial_speed : Shaft speed at t = 0 (phi_e'(0)), rad/s; >= 0 rad/s and <= 1e+06 rad/s.
+    """
 
     inertia: Quantity
     load: Quantity
@@ -52,7 +78,12 @@ class DriveShaft(TypedDict, total=False):
 
 
 class DriveStart(TypedDict, total=False):
-    """Begin in the state in which a case of another study ends; the service replaces it by initial values."""
+    """Begin in the state in which a case of another study ends; the service replaces it by initial values.
+
+    study : Id of the study.
+    case : Number of the case.
+    start : Of a case with many starts: which of them.
+    """
 
     study: str
     case: int
@@ -60,7 +91,18 @@ class DriveStart(TypedDict, total=False):
 
 
 class DriveRun(TypedDict, total=False):
-    """How long each case runs, what is evaluated, how accurately."""
+    """How long each case runs, what is evaluated, how accurately.
+
+    until : Run each case until its motion is settled, unless the run has a duration or a window.
+    at_most : Excitation periods after which the search for the settled motion ends: 100 to 100,000.
+    settled : Scaled distance from its orbit below which a run counts as settled.
+    max_period : Largest number of excitation periods after which a settled motion may repeat.
+    duration : End of the run, which then lasts for a given time: a number is seconds, a text says periods or a unit of
+        time.
+    window : Part of the run that is evaluated, [start, end]; by default the last third.
+    tolerance : Local relative error of the integration.
+    reset : Whether an upward crossing while torque is transmitted restarts the windup (literal).
+    """
 
     until: Literal["settled"]
     at_most: str
@@ -125,18 +167,24 @@ class Drive(Studies):
         Parameters
         ----------
         excitation : values
+            Fields frequency, amplitude_x, amplitude_y, phase; needed: frequency.
         pendulums : values
+            Fields inertia, mass, arm, spring_rate, spring_arm, damping, backlash, initial_angle, initial_speed,
+            initial_windup, initial_clutch, clutch; needed: inertia, mass, arm.
         shaft : values
+            Fields inertia, load, initial_speed; needed: inertia.
         gravity : number or text with a unit, optional
             Gravitational acceleration (g), m/s^2; >= 0 m/s^2 and <= 1000 m/s^2.
         clutch : values, optional
             Torque of the freewheel clutch over its windup.
         start : values, optional
-            Begin in the state in which a case of another study ends; the service replaces it by initial values.
+            Begin in the state in which a case of another study ends; the service replaces it by initial values; fields
+            study, case, start; needed: study, case.
         name : str, optional
             Name of the study.
         run : values, optional
-            How long each case runs, what is evaluated, how accurately.
+            How long each case runs, what is evaluated, how accurately; fields until, at_most, settled, max_period,
+            duration, window, tolerance, reset.
         derive : values, optional
             Parameters that follow from others in every case, by path: formulas of other parameters, of numbers with
             their units and of functions; `*` stands for every pendulum or step.

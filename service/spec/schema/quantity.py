@@ -76,7 +76,7 @@ def quantity_schema(parameter: Parameter) -> Schema:
     """Schema of one quantity: a number in the parameter's SI unit and range, or a text with its unit."""
     schema: Schema = {
         "anyOf": [{"type": "number", **_bounds(parameter)}, _TEXT],
-        "description": f"{parameter.help} ({parameter.symbol}), {parameter.unit}",
+        "description": _meaning(parameter),
         "examples": list(examples(parameter.unit)),
         "x-unit": parameter.unit,
         "x-range": parameter.range_text(),
@@ -84,6 +84,12 @@ def quantity_schema(parameter: Parameter) -> Schema:
     if parameter.default is not None and math.isfinite(parameter.default):
         schema["default"] = parameter.default
     return schema
+
+
+def _meaning(parameter: Parameter) -> str:
+    """What a parameter is, with its symbol and its unit where it has them."""
+    symbol = f" ({parameter.symbol})" if parameter.symbol else ""
+    return f"{parameter.help}{symbol}" + ("" if parameter.unit == "1" else f", {parameter.unit}")
 
 
 def _bounds(parameter: Parameter) -> Schema:

@@ -209,6 +209,13 @@ def test_help_lists_every_command_with_its_first_sentence(sprag: Sprag) -> None:
     assert titles == sorted(titles)
 
 
+def test_help_of_a_command_names_the_options_of_its_group(sprag: Sprag) -> None:
+    said = " ".join(sprag("schedule", "add", "-h").out.split())
+    assert "`sprag schedule --help` explains its further options: --cron, --at, --zone" in said
+    assert "--output, --units" in sprag("show", "curves", "-h").out
+    assert "range>" not in sprag("run", "-h").out
+
+
 def test_a_group_without_a_command_shows_its_help(sprag: Sprag) -> None:
     done = sprag("admin", "db")
     assert (done.code, done.out) == (2, "")

@@ -166,6 +166,9 @@ def test_wrong_settings_name_their_options(
         (("sensitivity", "--y", "nonsense"), "--y"), (("ribbon", "--y", "nonsense"), "--y"),
         (("yield", "nonsense > 3"), "--condition"), (("curves", "-o", "a.svg", "--language", "xx"), "--language"),
         (("curves", "-o", "a.csv", "--units", "bogus"), "--units"),
+        (("curves", "--units", "rpm"), "--units: only a file has them"),
+        (("curves", "-o", "a.csv", "--language", "uk"), "--language: only pictures have it"),
+        (("curves", "--y", "speed"), "did you mean 'shaft.speed.mean'?"),
     ):  # fmt: skip
         done = sprag("show", sources[0], *arguments)
         assert (done.code, named in done.err) == (2, True), (arguments, done.err)
@@ -178,7 +181,11 @@ def test_what_is_written_is_said_here_and_by_a_service(
     sprag: Callable[..., Finished], sources: tuple[Path, str], tmp_path: Path
 ) -> None:
     for source in sources:
-        for name, form, said in (("strobes", "svg", "picture"), ("trajectory", "csv", "table")):
+        for name, form, said in (
+            ("strobes", "svg", "picture"),
+            ("trajectory", "svg", "picture"),
+            ("trajectory", "csv", "table"),
+        ):
             file = tmp_path / f"file.{form}"
             done = sprag("show", source, name, "--case", 1, "-o", file, "--json")
             assert done.err.splitlines()[-1] == f"{said}: {file}", source

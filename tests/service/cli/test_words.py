@@ -120,6 +120,19 @@ def test_a_common_option_without_its_value_is_refused(sprag: Sprag, option: str)
         assert (done.code, f"Option '{option}' requires an argument." in done.err) == (2, True), done.err
 
 
+def test_what_is_no_number_is_called_so(sprag: Sprag) -> None:
+    done = sprag("admin", "token", "create", "--name", "x", "--expires", "30 days")
+    assert "Invalid value for '--expires': '30 days' is not a whole number." in done.err
+
+
+def test_a_spec_is_a_preset_by_its_name(sprag: Sprag, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for words in (("check", "one_pendulum"), ("show", "one_pendulum")):
+        assert "one_pendulum: valid, 512 cases" in sprag(*words).out
+    monkeypatch.chdir(tmp_path)
+    Path("one_pendulum").write_text("nothing")
+    assert sprag("check", "one_pendulum").code == 2, "a file of that name is read"
+
+
 def test_a_study_is_named_before_or_behind_the_view(sprag: Sprag, tmp_path: Path) -> None:
     spec = tmp_path / "absent.json"
     for words in (("show", spec, "curves"), ("show", "curves", spec), ("show", "curves", "--x", "a", spec)):

@@ -108,7 +108,9 @@ def _object(model: str, name: str, schema: Schema, made: dict[str, str]) -> str:
     title = model + "".join(word.capitalize() for word in name.split("_"))
     lines = "".join(f"    {key}: {_object(title, key, part, made)}\n" for key, part in keys.items())
     about = _sentence(schema.get("description", f"fields of {name}"))
-    body = f'(TypedDict, total=False):\n    """{about}"""\n\n{lines}\n\n'
+    meanings = [line for key, part in keys.items() for line in _about(f"{key} : ", part, " " * 4)]
+    told = "".join(f"{line}\n" for line in ["", "", *meanings]) + "    " if meanings else ""
+    body = f'(TypedDict, total=False):\n    """{about}{told}"""\n\n{lines}\n\n'
     same = next((known for known, text in made.items() if text.endswith(body)), title)
     made.setdefault(same, f"class {same}{body}")
     return same
@@ -172,15 +174,23 @@ def _sentence(text: str) -> str:
     return f"{text[0].upper()}{text[1:]}" + ("" if text.endswith(".") else ".")
 
 
+def _about(before: str, part: Schema, indent: str) -> list[str]:
+    """Lines with the meaning of a field, its range, and the fields that it has itself."""
+    of_items = part["items"] if isinstance(part.get("items"), Mapping) else part
+    names = list(of_items.get("properties", {}))
+    needed = [name for name in names if name in of_items.get("required", ())]
+    about = [part.get("description", ""), part.get("x-range", ""), f"fields {', '.join(names)}" if names else ""]
+    about += [f"needed: {', '.join(needed)}"] if needed and needed != names else []
+    said = "; ".join(filter(None, about))
+    text = before + _sentence(said) if said else ""
+    return textwrap.wrap(text, 120, initial_indent=indent, subsequent_indent=indent if not before else indent + "    ")
+
+
 def _docstring(meaning: str, fields: Schema, required: Any) -> str:
     lines = [f'        """{_sentence(meaning)}', "", "        Parameters", "        ----------"]
     for name, part in fields.items():
         kinds = "" if name in required else ", optional"
         kind = {"bool": "bool", "int": "int", "str": "str", "Quantity": "number or text with a unit"}
         lines.append(f"        {name} : {kind.get(_kind(part), 'values')}{kinds}")
-        about = part.get("description", "")
-        if part.get("x-range"):
-            about += f"; {part['x-range']}"
-        if about:
-            lines += textwrap.wrap(_sentence(about), 120, initial_indent=" " * 12, subsequent_indent=" " * 12)
+        lines += _about("", part, " " * 12)
     return "\n".join(lines) + '\n        """\n'

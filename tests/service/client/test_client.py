@@ -56,6 +56,19 @@ def answering(request: pytest.FixtureRequest) -> Iterator[tuple[str, int]]:
             thread.join()
 
 
+def test_a_refusal_says_what_was_given_and_what_is_allowed() -> None:
+    item = {
+        "parameter": "where",
+        "code": "invalid-text",
+        "message": "is not a range",
+        "value": "a > 1",
+        "allowed": "a >= 1",
+    }
+    refused = RefusedError(422, {"detail": "where: is not a range", "errors": [item]})
+    assert str(refused) == "where: is not a range (got 'a > 1'; allowed: a >= 1)"
+    assert refused.detail == str(RefusedError(422, {"detail": refused.detail})) == "where: is not a range"
+
+
 def test_every_foreign_answer_is_one_of_two_failures(answering: tuple[str, int]) -> None:
     address, status = answering
     # Without repetition, which is for services that come back; 502 would be asked again for a minute.

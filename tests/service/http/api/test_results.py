@@ -280,7 +280,7 @@ def test_instantaneous_values_as_a_table(service: Service, one_case: str) -> Non
         ("to=0", "to"),
         ("from=0.1&to=0.1", "to"),
         ("until=1", "until"),
-        ("format=svg", "format"),
+        ("format=xlsx", "format"),
     ],
 )
 def test_a_wrong_part_of_a_run_is_refused(service: Service, one_case: str, query: str, parameter: str) -> None:
