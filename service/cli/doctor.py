@@ -44,12 +44,22 @@ class Finding:
 
 def doctor(
     db: Database = None,
-    kernel: Annotated[bool, typer.Option("--kernel", help="Print the generated source of a kernel instead.")] = False,
-    pendulums: Annotated[int | None, typer.Option(min=1, help="Pendulums of that kernel; default: 1.")] = None,
-    coefficients: Annotated[int | None, typer.Option(min=1, help="Its clutch coefficients; default: 4.")] = None,
+    kernel: Annotated[
+        bool,
+        typer.Option(
+            "--kernel",
+            help="Print the generated source of a kernel instead; --pendulums, --coefficients and --tolerance choose it.",
+        ),
+    ] = False,
+    pendulums: Annotated[
+        int | None, typer.Option(min=1, hidden=True, help="Pendulums of that kernel; default: 1.")
+    ] = None,
+    coefficients: Annotated[
+        int | None, typer.Option(min=1, hidden=True, help="Its clutch coefficients; default: 4.")
+    ] = None,
     tolerance: Annotated[
         float | None,
-        typer.Option(min=MIN_TOLERANCE, max=MAX_TOLERANCE, help="Tolerance it is for; default: 1e-9."),
+        typer.Option(min=MIN_TOLERANCE, max=MAX_TOLERANCE, hidden=True, help="Tolerance it is for; default: 1e-9."),
     ] = None,
 ) -> None:
     """Check versions, database, permissions, disk, backups, kernels and known values; exit code 3 on any problem."""

@@ -66,6 +66,11 @@ class DriveShaft(TypedDict, total=False):
 
     inertia : Reduced inertia of the driven side (J_e), kg*m^2; > 0 kg*m^2 and <= 1e+06 kg*m^2.
     load : Load torque, which resists rotation only (M_c), N*m; >= 0 N*m and <= 1e+09 N*m.
+    bearing_damping : Viscous damping of the shaft, as by its bearings (lambda_e), N*m*s/rad; >= 0 N*m*s/rad and <=
+        1e+06 N*m*s/rad.
+    linear_load : Load torque per speed, as of a generator (k_1), N*m*s/rad; >= 0 N*m*s/rad and <= 1e+06 N*m*s/rad.
+    quadratic_load : Load torque per square of the speed, as of a fan or a pump (k_2), N*m*s^2/rad^2; >= 0 N*m*s^2/rad^2
+        and <= 1e+06 N*m*s^2/rad^2.
     initial_speed : Shaft speed at t = 0 (phi_e'(0)), rad/s; >= 0 rad/s and <= 1e+06 rad/s.
     """
 
@@ -172,7 +177,7 @@ class Drive(Studies):
             Fields inertia, mass, arm, spring_rate, spring_arm, damping, backlash, initial_angle, initial_speed,
             initial_windup, initial_clutch, clutch; needed: inertia, mass, arm.
         shaft : values
-            Fields inertia, load, initial_speed; needed: inertia.
+            Fields inertia, load, bearing_damping, linear_load, quadratic_load, initial_speed; needed: inertia.
         gravity : number or text with a unit, optional
             Gravitational acceleration (g), m/s^2; >= 0 m/s^2 and <= 1000 m/s^2.
         clutch : values, optional
