@@ -48,7 +48,8 @@ def doctor(
         bool,
         typer.Option(
             "--kernel",
-            help="Print the generated source of a kernel instead; --pendulums, --coefficients and --tolerance choose it.",
+            help="Print the generated source of a kernel instead; --pendulums, --coefficients and --tolerance choose "
+            "it.",
         ),
     ] = False,
     pendulums: Annotated[

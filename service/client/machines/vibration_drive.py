@@ -37,6 +37,10 @@ class DrivePendulum(TypedDict, total=False):
     spring_arm : Arm of the centring spring (a), m; >= -1000 m and <= 1000 m.
     damping : Viscous damping (lambda), N*m*s/rad; >= 0 N*m*s/rad and <= 1e+06 N*m*s/rad.
     backlash : Backlash of the freewheel (delta), rad; >= 0 rad and <= 1000 rad.
+    clutch_damping : Viscous damping of its freewheel while it transmits torque, parallel to the law of the clutch
+        (lambda_k), N*m*s/rad; >= 0 N*m*s/rad and <= 1e+06 N*m*s/rad.
+    overrunning_damping : Viscous drag of its freewheel while it overruns; where it is not 0, a backstop keeps the shaft
+        from turning back (lambda_o), N*m*s/rad; >= 0 N*m*s/rad and <= 1e+06 N*m*s/rad.
     initial_angle : Angle at t = 0 (phi(0)), rad; >= -1000 rad and <= 1000 rad.
     initial_speed : Angular speed at t = 0 (phi'(0)), rad/s; >= -1e+06 rad/s and <= 1e+06 rad/s.
     initial_windup : Windup of its clutch at t = 0; of no effect where the clutch is free (u(0)), rad; >= -1000 rad and
@@ -174,8 +178,8 @@ class Drive(Studies):
         excitation : values
             Fields frequency, amplitude_x, amplitude_y, phase; needed: frequency.
         pendulums : values
-            Fields inertia, mass, arm, spring_rate, spring_arm, damping, backlash, initial_angle, initial_speed,
-            initial_windup, initial_clutch, clutch; needed: inertia, mass, arm.
+            Fields inertia, mass, arm, spring_rate, spring_arm, damping, backlash, clutch_damping, overrunning_damping,
+            initial_angle, initial_speed, initial_windup, initial_clutch, clutch; needed: inertia, mass, arm.
         shaft : values
             Fields inertia, load, bearing_damping, linear_load, quadratic_load, initial_speed; needed: inertia.
         gravity : number or text with a unit, optional
