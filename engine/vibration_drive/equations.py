@@ -45,8 +45,10 @@ class _Pendulum:
     def __init__(self, code: LaneCode, layout: Layout, index: int) -> None:
         self.index = index
         self.base = layout.pendulums + index * layout.stride
-        for name in ("ml", "spring", "damping", "inverse_inertia", "inertia", "locked", "rate"):
+        for name in ("ml", "spring", "damping", "inverse_inertia", "inertia", "locked"):
             setattr(self, name, code.load(f"{name}{index}", self.row(layout, name)))
+        if layout.drag:
+            self.rate = code.load(f"rate{index}", self.row(layout, "rate"))
         first = self.row(layout, "force")
         self.force = [code.load(f"e{index}_{k}", first + k) for k in range(layout.coefficients)]
         self.phi = [code.load(f"phi{index}_0", self.row(layout, "phi"))]
@@ -140,13 +142,13 @@ def series_loop(layout: Layout) -> str:
     """Source of the loop that finds the series of every lane, in fractions of the step they allow, and stores them."""
     code = LaneCode(layout.lanes)
     order = layout.order
-    gravity, *_ = (code.load(name, getattr(layout, name)) for name in ("gravity", "load", "mobility"))
+    names = ("gravity", "load", "mobility", *(("linear", "quadratic") if layout.drag else ()))
+    gravity, *_ = (code.load(name, getattr(layout, name)) for name in names)
     x, y = _excitation(code, layout)
     pendulums = [_Pendulum(code, layout, i) for i in range(layout.n)]
     for p in pendulums:
         p.weight = code.let(f"weight{p.index}", p.ml * gravity)
     shaft = [code.load("W0", layout.speed)]
-    linear, quadratic = (code.load(name, getattr(layout, name)) for name in ("linear", "quadratic"))
     for k in range(order + 1):
         for p in pendulums:
             damping = f" + {p.rate}*({p.w[k]} - {shaft[k]})" if layout.drag else ""
@@ -157,7 +159,8 @@ def series_loop(layout: Layout) -> str:
             push = " + ".join(f"({p.torque[k]} + {p.locked}*{p.inertia}*{p.free})" for p in pendulums)
             against = " - load" if k == 0 else ""
             if layout.drag:
-                against += f" - {resistance(linear, quadratic, shaft[k], code.let(f'WW{k}', square(shaft, k)))}"
+                squared = code.let(f"WW{k}", square(shaft, k))
+                against += f" - {resistance(Term('linear'), Term('quadratic'), shaft[k], squared)}"
             code.let(f"A{k}", f"mobility*({push}{against})")
             shaft.append(code.let(f"W{k + 1}", f"A{k}*{1.0 / (k + 1)!r}"))
             for p in pendulums:

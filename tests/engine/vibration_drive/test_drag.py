@@ -14,6 +14,7 @@ from sprag_study.engine.vibration_drive.parameters import DRAG
 from sprag_study.engine.vibration_drive.regimes import Regime, settled_infos
 from sprag_study.engine.vibration_drive.settle import settle
 from sprag_study.engine.vibration_drive.simulate import trajectory
+from tests.engine.odd_drives import odd_drive
 from tests.engine.vibration_drive.drive import Columns, Results, batch_of, clutch, column, drive, one, pendulum, periods
 from tests.engine.vibration_drive.test_against_scipy import compare
 from tests.engine.vibration_drive.test_balances import random_machines
@@ -71,6 +72,25 @@ def test_balances_close(machines: Callable[..., list[Columns]], pendulums: int, 
         lost += results[f"pendulums.{i}.power.loss"] + results[f"pendulums.{i}.power.clutch_loss"]
         assert (results[f"pendulums.{i}.power.clutch_loss"].max() > 0.0) == (machines is damped)
     np.testing.assert_allclose(results["power.loss.mean"], lost, rtol=1e-14)
+
+
+def test_odd_drives_run_to_the_end() -> None:
+    """Exact equilibria, copies and clutches that lock, with drag: no chatter of the backstop or of damped clutches."""
+    draw = np.random.default_rng(4)
+    cases = [odd_drive(draw, 2) for _ in range(60)]
+    for columns in cases:
+        columns["shaft.bearing_damping"] = draw.choice([0.0, 10.0 ** draw.uniform(-4.0, -1.0)])
+        columns["shaft.quadratic_load"] = draw.choice([0.0, 10.0 ** draw.uniform(-5.0, -2.0)])
+        damping = draw.choice([0.0, 10.0 ** draw.uniform(-3.0, 0.0)])
+        drag = draw.choice([0.0, 10.0 ** draw.uniform(-4.0, -1.0)])
+        for i in range(2):
+            columns |= {f"pendulums.{i}.clutch_damping": damping, f"pendulums.{i}.overrunning_damping": drag}
+    results = Results(batch_of(cases), periods(30.0, 20.0, 30.0), len(cases))
+    assert set(results.endings) == {Ending.OK}
+    moving = results["power.input.mean"] > 1e-6
+    assert moving.sum() > 20
+    assert results["balance.energy"][moving].max() < 1e-6
+    assert results["balance.momentum"][moving].max() < 1e-6
 
 
 @pytest.mark.parametrize("pendulums", [1, 2])
