@@ -16,6 +16,7 @@ from sprag_study.service.http.web.form.columns import COLUMNS
 from sprag_study.service.http.web.form.entries import Faults
 from sprag_study.service.http.web.form.machine import model_name, places
 from sprag_study.service.http.web.form.machine_spec import step_of
+from sprag_study.service.http.web.form.sent import with_first_values
 from sprag_study.service.http.web.form.spec import form_with_spec
 from sprag_study.service.http.web.form.walk import Filled
 from sprag_study.service.jobs.preview import preview_json
@@ -172,6 +173,7 @@ def check_form(
 
     ``known`` counts the cases of a study that need not be run; ``left`` are the seconds until its deadline.
     """
+    values = with_first_values(values)
     spec, form = form_with_spec(values)
     faults = form.faults
     found = Checked(

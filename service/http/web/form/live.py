@@ -22,7 +22,7 @@ from sprag_study.service.http.web.form.entries import Values, plain
 from sprag_study.service.http.web.form.machine import BASE, choices_of, entries, form_of, model_name, row_of
 from sprag_study.service.http.web.form.machine_spec import base_of
 from sprag_study.service.http.web.form.own_machine import single_machine
-from sprag_study.service.http.web.form.sent import ends_of, settle
+from sprag_study.service.http.web.form.sent import ends_of, settle, with_first_values
 from sprag_study.service.http.web.form.spec import spec_of, values_of
 from sprag_study.service.http.web.form.values import Form
 from sprag_study.service.http.web.templates import fragment
@@ -57,7 +57,7 @@ _WIDTH: Final = 560
 
 def drawn_machine(values: Mapping[str, str]) -> tuple[Study, dict[str, Any]] | None:
     """The machine of a form as a study of one case, with its spec; None while it has faults."""
-    spec, _faults = spec_of(values)
+    spec, _faults = spec_of(with_first_values(values))
     try:
         parsed = parse_spec({**without_cases(spec), "axes": []})
     except SpecError:

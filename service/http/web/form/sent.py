@@ -66,19 +66,18 @@ def settle(values: Values, *, with_ticks: bool = True) -> None:
         for path in paths:
             if path not in changed:
                 _vary(values, part, path, wanted=path in varying)
-    if with_ticks:
-        _begin(values)
 
 
-def _begin(values: Values) -> None:
-    """Give a number that varies, and has no value of its own, the first one that it takes: the machine needs one."""
-    rows = varied(values)
+def with_first_values(values: Mapping[str, str]) -> Values:
+    """The form with the first value of its axis for each required number that varies and has no value of its own."""
+    found, rows = dict(values), varied(values)
     for entry in entries(values):
         row = rows.get(base_path(entry.name)) if entry.field.required else None
         if row is not None and not values.get(entry.name, "").strip():
             pointer = f"{PARTS[part_of(values)].pointer}/{row}"
             name = "values" if values.get(f"{pointer}/way") == "values" else "from"
-            values[entry.name] = with_last_unit(split_list(values.get(f"{pointer}/{name}", "")) or [""])[0]
+            found[entry.name] = with_last_unit(split_list(values.get(f"{pointer}/{name}", "")) or [""])[0]
+    return found
 
 
 def _part_tolerances(values: Values) -> None:
