@@ -24,7 +24,7 @@ from pydantic_settings import (
     SettingsConfigDict,
 )
 
-from sprag_study.service.delivery import Delivery, DeliverySettings
+from sprag_study.service.delivery import Delivery, DeliverySettings, origin_of
 from sprag_study.service.oidc import OidcSettings
 from sprag_study.service.zones import zones
 
@@ -422,4 +422,6 @@ def effective(settings: Settings) -> Iterator[EffectiveSetting]:
             origin = variable if variable in environment else os.environ[FILE_VARIABLE]
         if name == "database" and not value:
             value = str(default_database_path())
+        if name == "alert_to":  # the path of a webhook can be a secret of its receiver
+            value = tuple(origin_of(target) or target for target in value)
         yield EffectiveSetting(name, HIDDEN if isinstance(value, SecretStr) else shown(value), origin)

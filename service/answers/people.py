@@ -59,7 +59,7 @@ class AuditEntry(TypedDict):
     target: Annotated[
         str,
         Doc(
-            "id of the study, schedule, component, view or token, or name of the user; "
+            "id of the study, schedule, component, view or token, or name of the user, the machine or the backup; "
             "empty for the database and the log"
         ),
     ]

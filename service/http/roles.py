@@ -102,6 +102,7 @@ _ADMINISTRATOR: Final = (
     "POST /me/users",
     "GET /me/settings",
     "POST /me/settings",
+    "POST /me/backups",
     "GET /audit",
     "GET /users",
 )

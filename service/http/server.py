@@ -23,6 +23,7 @@ from sprag_study.service.http.app import create_app
 from sprag_study.service.http.timeouts import READING
 from sprag_study.service.http.tls import LOOK_SECONDS, Certificate
 from sprag_study.service.jobs.dispatching import start_dispatcher_process, worker_settings
+from sprag_study.service.jobs.settings_log import note_settings
 from sprag_study.service.settings import Settings
 from sprag_study.worker import traces
 from sprag_study.worker.limits import MAX_CONNECTIONS
@@ -263,6 +264,7 @@ def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) 
         ssl_certfile=None if certificate is None else certificate.file,
         ssl_keyfile=None if certificate is None else certificate.key,
     )
+    note_settings(app.state.context.store, app.state.context.origins)
     supervisor = Supervisor(
         lambda: start_dispatcher_process(worker_settings(settings)),
         leaving=app.state.context.ending,

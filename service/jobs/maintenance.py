@@ -81,6 +81,17 @@ def backups(folder: Path) -> list[tuple[datetime, Path]]:
     return sorted(found)
 
 
+def make_backup(store: Store, folder: Path, now: datetime) -> Path:
+    """Write a backup of ``now`` into ``folder``, which is made where it is missing; raises StoreError and OSError."""
+    folder.mkdir(PRIVATE_FOLDER_MODE, parents=True, exist_ok=True)
+    sweep(folder.glob(f".sprag-*.sqlite3.*{PART_SUFFIX}"))
+    target = folder / f"sprag-{now.astimezone(UTC):{_STAMP}}.sqlite3"
+    for problem in store.backup(target):
+        _LOG.error("In the backup: %s.", problem)
+    _LOG.info("Backup: %s (%.3g MB).", target, target.stat().st_size / 1e6)
+    return target
+
+
 @dataclass(slots=True)
 class _Task:
     """A nightly task; `do` gets the time, the due time and whether the clock is trusted, and returns whether it was
@@ -197,12 +208,8 @@ class Maintenance(threading.Thread):
     def _back_up(self, folder: Path, now: datetime, due: datetime, believed: bool) -> bool:
         """Write a backup unless there is one since ``due``; then remove the oldest."""
         folder.mkdir(PRIVATE_FOLDER_MODE, parents=True, exist_ok=True)
-        sweep(folder.glob(f".sprag-*.sqlite3.*{PART_SUFFIX}"))
         if not any(due <= when <= now for when, _ in backups(folder)):
-            target = folder / f"sprag-{now.astimezone(UTC):{_STAMP}}.sqlite3"
-            for problem in self._store.backup(target):
-                _LOG.error("In the backup: %s.", problem)
-            _LOG.info("Backup: %s (%.3g MB).", target, target.stat().st_size / 1e6)
+            make_backup(self._store, folder, now)
         if believed:
             # A backup with a future name was made under a wrong clock: it is neither removed nor counted.
             for _, path in [made for made in backups(folder) if made[0] <= now][: -self._plan.keep]:

@@ -70,5 +70,5 @@ OTHER_ACCOUNT: Final = N_(
 MANY_TOKENS: Final = N_("{user} has {count} valid tokens, the most at one time: revoke those that nothing uses.")
 TOKENS_LATELY: Final = N_("{user} was given {count} tokens within a day, the most: try again tomorrow.")
 #: Of an alert: why, as the disk and the backups have it.
-BACKUP_FAILED: Final = N_("The nightly backup failed: {problem}. It is tried again every ten minutes.")
+BACKUP_FAILED: Final = N_("A backup of the database failed: {problem}.")
 DISK_LOW: Final = N_("{free} MB are free on the disk that holds {path}, less than {least} MB (SPRAG_DISK_FREE).")

@@ -31,10 +31,16 @@ from sprag_study.service.http.web.administration import (
     own_name,
     token_to_revoke,
 )
+from sprag_study.service.http.web.deployment import (
+    HEALTH_DAYS,
+    backups_listed,
+    begin_backup,
+    is_being_backed_up,
+    schedule_health,
+)
 from sprag_study.service.http.web.form.values import Form
 from sprag_study.service.http.web.templates import page
 from sprag_study.service.http.web.way_in import access_of, within
-from sprag_study.service.jobs.maintenance import backups
 from sprag_study.service.jobs.reports.channels import DeliveryError
 from sprag_study.service.jobs.reports.trial import try_mail, try_webhook
 from sprag_study.service.jobs.workers import worker_list
@@ -50,7 +56,6 @@ from sprag_study.service.zones import is_zone, zones
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
-    from datetime import datetime
 
     from sprag_study.service.storage.people.people import TokenRecord
 
@@ -268,26 +273,28 @@ def _settings(context: Context, status: int = 200, **shown: Any) -> Response:
 
 @router.get("/me/workers")
 def workers(context: Ctx) -> Response:
-    """The dispatchers and their workers, as they last reported them, and the backups."""
-    folder = context.settings.backup_folder
+    """The dispatchers and their workers, as they last reported them, how schedules fare, and the backups."""
+    store, folder = context.store, context.settings.backup_folder
     return page(
         "workers.html",
         parts=_parts(),
-        found=worker_list(context.store.dispatchers),
-        backups=_backups(folder),
+        found=worker_list(store.dispatchers),
+        backups=backups_listed(folder),
         folder=folder,
-        alerts=context.store.alerts.present(),
+        making=is_being_backed_up(),
+        on_server=store.session.on_server,
+        administers=administers(),
+        alerts=store.alerts.present(),
+        schedules=schedule_health(store),
+        days=HEALTH_DAYS,
     )
 
 
-def _backups(folder: str) -> list[datetime]:
-    """When the backups were made, latest first; none where the folder cannot be read."""
-    from pathlib import Path
-
-    try:
-        return [made for made, _ in reversed(backups(Path(folder)))] if folder else []
-    except OSError:
-        return []
+@router.post("/me/backups")
+def back_up(context: Ctx) -> Response:
+    """Begin a backup beside the requests, in the folder of the nightly ones; one at a time."""
+    begin_backup(context)
+    return _back("/me/workers#backups")
 
 
 @router.get("/me/audit")

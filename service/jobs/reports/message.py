@@ -34,7 +34,7 @@ _LINKS: Final = {
     "workers": N_("Workers and backups"),
 }
 #: What alerts are about.
-_ALERTS: Final = {"backup": N_("the nightly backup failed"), "disk": N_("a disk fills")}
+_ALERTS: Final = {"backup": N_("a backup failed"), "disk": N_("a disk fills")}
 
 
 @dataclass(frozen=True, slots=True)

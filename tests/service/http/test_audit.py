@@ -229,7 +229,7 @@ def office(settings: Settings, service: Service, connect: Callable[..., httpx.Cl
 def test_every_route_that_changes_something_is_walked() -> None:
     changing = {route for route, role in ROLES.items() if role not in {None, Role.VIEWER} and route[:4] != "GET "}
     # What administrators change: tests/service/http/web/test_administration.py.
-    assert changing == {*CHANGES, "POST /me/users", "POST /me/settings"}
+    assert changing == {*CHANGES, "POST /me/users", "POST /me/settings", "POST /me/backups"}
 
 
 @pytest.mark.parametrize("route", CHANGES)

@@ -108,7 +108,7 @@ def test_a_backup_that_fails_is_said_to_administrators_who_have_an_address(store
         store.clock.seconds += 601.0  # type: ignore[attr-defined]
     ((channel, target, content),) = waiting(store)
     assert (channel, target, content["alert"]) == ("email", "ada@example.com", "backup")
-    assert content["sentence"].startswith("The nightly backup failed: [Errno 17] File exists")
+    assert content["sentence"].startswith("A backup of the database failed: [Errno 17] File exists")
     folder.unlink()
     maintenance.look()
     assert store.alerts.present() == ()
