@@ -15,7 +15,13 @@ from sprag_study.service.plain_data import plain
 _UNITLESS: Final = ("", "1")
 
 
-def points_of(cases: object, argument: str) -> str:
+def measured_of(measured: Any) -> Any:
+    """Measured points as a spec has them: a table as the text of a CSV file; an empty cell was not measured."""
+    given = isinstance(measured, Mapping) and "csv" in measured
+    return measured if given else {"csv": points_of(measured, "measured", gaps=True)}
+
+
+def points_of(cases: object, argument: str, *, gaps: bool = False) -> str:
     """The text of a CSV file of a table: a column for each parameter, by its path, and a row for each case.
 
     Parameters
@@ -26,13 +32,17 @@ def points_of(cases: object, argument: str) -> str:
         a cell can be a text or a quantity with its unit. In a mapping one value can stand for a whole column.
     argument : str
         Name of the argument in messages.
+    gaps : bool
+        Whether a cell can have no value.
 
     Raises
     ------
     ArgumentError
-        For what is no table, and for a cell without a value.
+        For what is no table, and for a cell without a value where there can be no ``gaps``.
     """
     columns, units = _columns(cases, argument)
+    if gaps:
+        columns = {name: _filled(column) for name, column in columns.items()}
     read = {name: _cells(column, argument, name) for name, column in columns.items()}
     lengths = {len(cells) for cells in read.values() if isinstance(cells, list)} or {1}
     if len(lengths) > 1:
@@ -62,6 +72,13 @@ def _columns(cases: Any, argument: str) -> tuple[dict[str, Any], Mapping[str, st
         raise ArgumentError(argument, type(cases).__name__, "a table with a column for each parameter")
     names = dict.fromkeys(name for row in rows for name in row)
     return {name: [row.get(name) for row in rows] for name in names}, {}
+
+
+def _filled(column: Any) -> Any:
+    """A column with an empty text in place of None and NaN."""
+    if isinstance(column, str) or not isinstance(column, Iterable):
+        return column
+    return ["" if cell is None or cell != cell else cell for cell in column]  # noqa: PLR0124 - NaN
 
 
 def _cells(column: Any, argument: str, name: str) -> Any:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, Self
 
+from sprag_study.service.client.case_tables import measured_of
 from sprag_study.service.client.drafts import Draft, Entries, Quantity, Results, known, results_of
 
 
@@ -102,7 +103,7 @@ class Studies(Draft):
         self,
         *,
         unknown: Entries,
-        measured: Mapping[str, Any],
+        measured: Any,
         loss: Literal["linear", "soft_l1", "huber", "cauchy"] | None = None,
         refits: int | None = None,
         seed: int | None = None,
@@ -113,8 +114,9 @@ class Studies(Draft):
         ----------
         unknown : values
             What is unknown, each between two values; fields path, from, to.
-        measured : values
-            Fields csv.
+        measured : table
+            A frame, a mapping of columns or a sequence of mappings, as `cases` of `sprag.run`, or {"csv": text}; a cell
+            without a value was not measured.
         loss : values, optional
             How much a large residual counts: linear (least squares), or less with the others.
         refits : int, optional
@@ -124,7 +126,11 @@ class Studies(Draft):
         """
         return self._choosing(
             calibrate=known(
-                unknown=self._entries(unknown, "values"), measured=measured, loss=loss, refits=refits, seed=seed
+                unknown=self._entries(unknown, "values"),
+                measured=measured_of(measured),
+                loss=loss,
+                refits=refits,
+                seed=seed,
             )
         )
 

@@ -16,6 +16,12 @@ FIRST: Final = ("name", "run", "derive")
 PACKAGE: Final = "sprag_study.service.client.machines"
 ELSEWHERE: Final = ("sprag", "model", "base", "axes")
 
+#: What is said of a table.
+TABLE: Final = (
+    'a frame, a mapping of columns or a sequence of mappings, as `cases` of `sprag.run`, or {"csv": text}; '
+    "a cell without a value was not measured"
+)
+
 HEAD: Final = '''"""Specs written in Python.
 
 Made of the descriptions of the spec by ``python -m tests.service.client.generate``; do not edit.
@@ -26,6 +32,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, Self, TypedDict
 
+from sprag_study.service.client.case_tables import measured_of
 from sprag_study.service.client.drafts import Draft, Entries, Quantity, Results, known, results_of
 '''
 
@@ -130,7 +137,7 @@ def _kind(schema: Schema) -> str:
         case {"type": "array", "items": Mapping() as items}:
             return "Entries" if _has(items, "path") else "Results" if _has(items, "result") else "Sequence[Any]"
         case {"type": "object"}:
-            return "Mapping[str, Any]"
+            return "Any" if _is_table(schema) else "Mapping[str, Any]"
     return "Any"
 
 
@@ -139,8 +146,15 @@ def _has(items: Schema, field: str) -> bool:
     return field in items.get("properties", {}) or any(_has(part, field) for part in items.get("anyOf", ()))
 
 
+def _is_table(schema: Schema) -> bool:
+    """Whether a value is a table, which a spec has as the text of a CSV file, and nothing else."""
+    return [*schema.get("properties", ())] == ["csv"]
+
+
 def _value(name: str, schema: Schema) -> str:
     """How a value of Python becomes one of the spec."""
+    if _is_table(schema):
+        return f"measured_of({name})"
     match _kind(schema):
         case "Entries":
             alone = "plus_minus" if _has(schema["items"], "plus_minus") else "values"
@@ -191,6 +205,7 @@ def _docstring(meaning: str, fields: Schema, required: Any) -> str:
     for name, part in fields.items():
         kinds = "" if name in required else ", optional"
         kind = {"bool": "bool", "int": "int", "str": "str", "Quantity": "number or text with a unit"}
-        lines.append(f"        {name} : {kind.get(_kind(part), 'values')}{kinds}")
-        lines += _about("", part, " " * 12)
+        shown = "table" if _is_table(part) else kind.get(_kind(part), "values")
+        lines.append(f"        {name} : {shown}{kinds}")
+        lines += _about("", {"description": TABLE} if _is_table(part) else part, " " * 12)
     return "\n".join(lines) + '\n        """\n'

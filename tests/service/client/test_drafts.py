@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import sprag_study as sprag
@@ -17,6 +18,7 @@ from sprag_study.service.spec.kinds.registry import CASES
 from sprag_study.worker import models
 
 CLASSES: dict[str, Any] = {"vibration-drive": sprag.Drive, "machine-shaft": sprag.Shaft}
+SPEED = "shaft.speed.mean"
 PENDULUM: dict[str, Any] = {
     "inertia": 1e-3, "mass": 0.5, "arm": "30 mm", "spring_rate": 9000, "spring_arm": "50 mm", "damping": 0.01,
 }  # fmt: skip
@@ -192,3 +194,16 @@ def test_a_number_in_a_condition_is_one() -> None:
     assert goal["goal"]["subject_to"][1]["at_most"] == "3 N*m"
     limited = drive().goal(vary={"mass": (0.3, 0.6)}, best={"efficiency": "max"}, subject_to=["efficiency >= 0.5"])
     assert cases(limited) == 100
+
+
+def test_measured_points_are_a_table() -> None:
+    table = pd.DataFrame({"shaft.load": [0.05, 0.1, 0.2], SPEED: [400.0, np.nan, 300.0], "sigma": [4.0, np.nan, 3.0]})
+    table.attrs["units"] = {"shaft.load": "N*m", SPEED: "rpm"}
+    text = f"shaft.load [N*m],{SPEED} [rpm],sigma\n0.05,400.0,4.0\n0.1,,\n0.2,300.0,3.0\n"
+    for measured in (table, {"csv": text}):
+        draft = drive().set(run={}).calibrate(unknown={"damping": (0.001, 0.1)}, measured=measured)
+        assert draft["calibrate"]["measured"] == {"csv": text}
+    rows = [{"shaft.load": "0.1 N*m", SPEED: 40.0}, {"shaft.load": 0.2, SPEED: 30.0}]
+    assert cases(drive().calibrate(unknown={"damping": (0.001, 0.1)}, measured=rows)) > 2
+    with pytest.raises(ArgumentError, match="measured"):
+        drive().calibrate(unknown={"damping": (0.001, 0.1)}, measured=3)
