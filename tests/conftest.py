@@ -40,6 +40,7 @@ LONG = (
     "service/http/web/test_accessibility.py",
     "engine/compile/test_ways.py",
     "service/http/web/test_study_pages.py",
+    "service/http/web/test_motion_pages.py",
     "acceptance/test_faults.py",
     "engine/vibration_drive/test_against_scipy.py",
     "acceptance/test_commands.py",
@@ -59,8 +60,7 @@ LONG = (
     "worker/executors/test_job_queue.py",
     "sprag_study/test_library.py",
     "service/test_presets.py",
-    "service/http/web/test_motion_pages.py",
-    "service/http/web/test_prefix_page.py",
+    "service/http/web/test_study_sheet.py",
     "service/report/test_report.py",
     "service/schedules/test_two_nights.py",
 )
@@ -71,8 +71,10 @@ TOGETHER = (
     *(
         tuple(f"tests/service/http/web/test_{name}.py" for name in names.split())
         for names in (
-            "connection designers goal_forms nights sheet paper_and_phones study_pages",
-            "form_in_browser keys motion_pages order returning script_texts walks",
+            "connection designers figures_in_browser me nights paper_and_phones rows_in_browser sheet study_pages "
+            "study_rows",
+            "form_in_browser keys live machine_forms motion_pages order prefix_page report_walk returning script_texts "
+            "site toy_in_browser walks",
         )
     ),
     tuple(f"tests/acceptance/test_{name}.py" for name in ("bad_input", "commands", "notebook")),

@@ -93,13 +93,33 @@ def chromium() -> str:
     return found
 
 
+_BROWSER = pytest.StashKey[tuple[ExitStack, Browser]]()
+
+
 @pytest.fixture(scope="module")
-def browser(chromium: str) -> Iterator[Browser]:
-    """One browser for the tests of a module; its event loop, in which no other could run, ends with them."""
-    with sync_playwright() as playwright:
+def browser(chromium: str, request: pytest.FixtureRequest) -> Browser:
+    """A browser, which the files share that need one and follow each other."""
+    stash = request.config.stash
+    if _BROWSER not in stash:
+        stack = ExitStack()
+        request.config.add_cleanup(stack.close)
+        playwright = stack.enter_context(sync_playwright())
         opened = playwright.chromium.launch(executable_path=chromium, args=_OPTIONS)
-        yield opened
-        opened.close()
+        stack.callback(opened.close)
+        stash[_BROWSER] = stack, opened
+    return stash[_BROWSER][1]
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> Iterator[None]:
+    """Close the browser before a file that needs none: beside its event loop no other could run."""
+    try:
+        return (yield)
+    finally:
+        goes_on = nextitem is not None and (nextitem.path == item.path or "browser" in nextitem.fixturenames)
+        if not goes_on and _BROWSER in item.config.stash:
+            item.config.stash[_BROWSER][0].close()
+            del item.config.stash[_BROWSER]
 
 
 @pytest.fixture(scope="session")

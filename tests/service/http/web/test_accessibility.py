@@ -228,6 +228,25 @@ def test_axe_finds_nothing_on_any_page_and_each_fits_the_screen(
     assert ukrainian.locator("html").get_attribute("lang") == "uk"
 
 
+def test_what_is_alike_is_judged_once_and_what_differs_each(open_tab: Callable[..., Page]) -> None:
+    page = open_tab()
+    page.goto("/problems/not-found")
+    rows, unnamed = "<tr><td><label>Load <input></label></td></tr>" * 9, "<tr><td><input></td></tr>"
+
+    def shown(*parts: str) -> str:
+        body = f"<h1>A page</h1><table><tbody>{''.join(parts)}</tbody></table><p id=a>1</p><p id=a class=b>2</p>"
+        page.set_content(f"<html lang=en><title>A page</title><main>{body}</main></html>")
+        assert page.evaluate(SHORTER, True) == ["a"]
+        return page.locator("tbody").inner_html()
+
+    assert shown(rows, unnamed, rows) == rows[: len(rows) // 9 * 2] + unnamed
+    assert [one.partition(":")[0] for one in findings(page, Axe(), {"runOnly": NARROW})] == ["label"]
+    assert shown(rows, unnamed, rows) == ""  # an earlier page had it
+    marked = rows.replace("<td>", "<td class=marked>", 1)
+    assert "marked" in shown(marked)
+    assert page.locator("tr").count() == 1
+
+
 def test_no_other_route_answers_with_a_page(service: Service) -> None:
     """A new page has to be judged too; a figure that a script puts into its page is none."""
     study = service.submit()
