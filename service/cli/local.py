@@ -174,6 +174,7 @@ def presets(
         write_json({"name": name, "file": file, "text": text})
     else:
         write_text(text)
+        say(_("{name} is the file {file}", name=name, file=file))  # its ending says what is to be kept
 
 
 def run(
