@@ -8,7 +8,7 @@ import os
 import shutil
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import urlsplit
@@ -138,21 +138,27 @@ def example(office: Office) -> str:
     return office.submit()
 
 
-@pytest.fixture
-def visitor(browser: Browser, office: Office, request: pytest.FixtureRequest) -> Iterator[Visitor]:
-    """A tab at desktop width (or as ``tab`` marks it); no page may ask another host or break a script."""
-    options = {"viewport": {"width": 1280, "height": 900}, "accept_downloads": True, **getattr(request, "param", {})}
-    context = browser.new_context(base_url=office.address, **options)
-    context.set_default_timeout(1000 * SECONDS)
-    page = context.new_page()
+@contextmanager
+def visit(page: Page, address: str) -> Iterator[Visitor]:
+    """A visit of the service at an address, whose pages may not ask another host nor break a script."""
     found = Visitor(page)
     page.on("request", found.note_request)
     page.on("console", found.note_message)
     page.on("pageerror", lambda error: found.errors.append(str(error)))
     yield found
-    context.close()
-    assert found.hosts <= {urlsplit(office.address).netloc}
+    page.context.close()
+    assert found.hosts <= {urlsplit(address).netloc}
     assert found.errors == []
+
+
+@pytest.fixture
+def visitor(browser: Browser, office: Office, request: pytest.FixtureRequest) -> Iterator[Visitor]:
+    """A visit at desktop width, or with the options that the test names."""
+    options = {"viewport": {"width": 1280, "height": 900}, "accept_downloads": True, **getattr(request, "param", {})}
+    context = browser.new_context(base_url=office.address, **options)
+    context.set_default_timeout(1000 * SECONDS)
+    with visit(context.new_page(), office.address) as found:
+        yield found
 
 
 @pytest.fixture

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from typing import TYPE_CHECKING
 
 from playwright.sync_api import expect
 
+from tests.service.http.web.conftest import visit
 from tests.service.http.web.fields import named
+from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from playwright.sync_api import Page
 
-    from tests.service.http.web.conftest import Office, Visitor
+    from tests.service.conftest import Service
+    from tests.service.http.web.conftest import Visitor
 
 LONG = {
     "axes": [
-        {"path": "shaft.load", "linspace": [0, 1, 250]},
-        {"path": "excitation.frequency", "linspace": [20, 35, 1000]},
+        {"path": "shaft.load", "linspace": [0, 1, 25]},
+        {"path": "excitation.frequency", "linspace": [20, 35, 20]},
     ]
 }
 LOST = "The connection to the service is lost"
@@ -74,29 +80,45 @@ def test_a_refusal_of_the_form_is_told(visitor: Visitor) -> None:
 
 
 def test_a_running_study_is_followed_on_every_page_and_through_a_lost_connection(
-    visitor: Visitor, office: Office, example: str
+    open_tab: Callable[..., Page], service: Service
 ) -> None:
-    page = visitor.page
+    page = open_tab()
     page.goto("/")
-    study_id = office.submit(wait=False, name="Followed", **LONG)
+    with visit(page, page.url):
+        follow(page, service)
+
+
+def follow(page: Page, service: Service) -> None:
+    """Follow a study whose rows come as the test commits them."""
+    service.fill(example := service.submit())
+    study_id = service.submit({**SPEC, "name": "Followed", **LONG})
+    parts = itertools.count()
+
+    def goes_on() -> None:
+        part = next(parts)
+        service.fill(study_id, range(40 * part, 40 * (part + 1)))
+
+    goes_on()
     row = page.locator("#studies tr", has=page.locator(f"a[href='/studies/{study_id}']"))
     expect(row.locator(".state")).to_have_text("running")
 
     for query in ("x=shaft.load&y=shaft.speed.mean&at=excitation.frequency=20", "z=shaft.speed.mean"):
         page.goto(f"/studies/{study_id}?{query}")
         page.evaluate("() => { document.querySelector('#chart').dataset.mine = '1'; }")
+        goes_on()
         page.wait_for_function("() => document.querySelector('#chart:not([data-mine])')")
 
     page.goto(f"/studies/{study_id}/rows?where=shaft.load+%3E%3D+0")
     # What is half typed stays when the rows follow the run.
     page.get_by_label("Name of this view").fill("Half")
     page.evaluate("() => { document.querySelector('#rows').dataset.mine = '1'; }")
+    goes_on()
     page.wait_for_function("() => document.querySelector('#rows:not([data-mine])')")
     expect(page.get_by_label("Name of this view")).to_have_value("Half")
 
     for address, part in (
-        (f"/studies/{study_id}/cases/249999", "#outcome"),
-        (f"/studies/{study_id}/rows?case=0&case=249999", "#rows"),
+        (f"/studies/{study_id}/cases/499", "#outcome"),
+        (f"/studies/{study_id}/rows?case=0&case=499", "#rows"),
         (f"/compare?study={example}&study={study_id}&x=shaft.load", "#told"),
     ):
         page.goto(address)
@@ -108,19 +130,20 @@ def test_a_running_study_is_followed_on_every_page_and_through_a_lost_connection
     page.route("**/events", lambda route: route.fulfill(status=401))
     page.goto(f"/studies/{study_id}")
     page.evaluate("() => { document.querySelector('#progress').dataset.mine = '1'; }")
+    goes_on()
     page.wait_for_function("() => document.querySelector('#progress:not([data-mine])')")
     page.unroute("**/events")
 
     waiting = page.context.new_page()
-    waiting.goto(f"/studies/{study_id}/cases/249999")
+    waiting.goto(f"/studies/{study_id}/cases/499")
     expect(waiting.locator("#outcome")).to_contain_text("has not been run yet")
     page.goto(f"/studies/{study_id}")
     expect(page.locator("#progress")).to_contain_text("left")
     cut(page)
     page.evaluate("() => sprag.fetchJson('/api/v1/studies').catch(() => {})")
     expect(page.get_by_role("alert")).to_contain_text(LOST)
-    office.http.post(f"/api/v1/studies/{study_id}:cancel")
-    office.wait(study_id)
+    service.http.post(f"/api/v1/studies/{study_id}:cancel")
+    service.store.work.settle(service.store.work.take_over("test"), service.store.studies.get(study_id).number)
     mend(page)
     expect(page.locator("#progress .state")).to_have_text("cancelled")
     expect(waiting.locator("#outcome")).to_contain_text("Cancelled")
