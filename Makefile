@@ -14,11 +14,12 @@ unexport PYTHONDONTWRITEBYTECODE
 
 CHECKS := mypy ruff imports reference catalogues collect
 
-.PHONY: help demo test check kernels serve docs dist clean $(CHECKS)
+.PHONY: help demo test check kernels bounds serve docs dist clean $(CHECKS)
 
 help:
 	@echo "make demo [EXIT=1]   set up, run the example study over HTTP, show its curve, then serve (or stop)"
 	@echo "make test            set up and run every check and test"
+	@echo "make bounds          run quick tests with the lowest and the highest versions of libraries"
 	@echo "make serve           set up and run the service"
 	@echo "make docs            build the documentation as a site, which the service shows"
 	@echo "make dist            build a release in dist/: its sources, and the wheel of them"
@@ -33,11 +34,13 @@ serve: $(RUNTIME)
 docs: $(DEV)
 	$(BIN)/python -m docs.site
 
-# The wheel is built from the packed sources, so that it has nothing that they lack. Old builds would be packed as well.
+# The wheel is built from the packed sources, so that it has nothing that they lack. Old builds would be packed as well. The
+# constraints are the versions with which a release was tested.
 dist: docs
 	rm -rf build dist *.egg-info/SOURCES.txt
 	$(BIN)/python -c 'from setuptools.build_meta import build_sdist; build_sdist("dist")' >/dev/null
 	$(BIN)/python -m pip --disable-pip-version-check --quiet wheel --no-deps --no-build-isolation --wheel-dir dist dist/*.tar.gz
+	cp constraints.txt dist/
 	@ls dist
 
 # The tests of one file share processes and servers, so they stay together, as do some files (TOGETHER in tests/conftest.py).
@@ -72,6 +75,11 @@ collect: $(DEV)
 # Processes that begin side by side would each compile what the formulas of shafts need.
 kernels: $(DEV)
 	$(BIN)/sprag run examples/compressor.toml >/dev/null
+
+# No part of `make test`: it installs everything twice.
+bounds: $(DEV)
+	$(BIN)/python -m benchmarks.bounds lowest
+	$(BIN)/python -m benchmarks.bounds highest
 
 # The first Python in PYTHONS that is new enough makes the environment; a broken environment is made anew. The pip that
 # Python brings takes twice as long to install the rest.

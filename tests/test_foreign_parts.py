@@ -28,23 +28,15 @@ USED = {
     ("fastapi", "fastapi.dependencies.models", "Dependant"): (
         "the parameters that a route takes", "service/http/requests.py",
     ),
-    ("fastapi", "fastapi.routing", "iter_route_contexts"): ("the methods of a path", "service/http/handlers.py"),
     ("pint", "pint.util", "UnitsContainer.items"): (
         "the root units of a unit, Unit._units", "service/reading/units.py",
     ),
-    ("starlette", "starlette.applications", "Starlette.build_middleware_stack"): (
-        "the guard is outside of all layers", "service/http/app.py",
+    ("starlette", "starlette.middleware.gzip", "GZipResponder.apply_compression"): (
+        "compression in few threads", "service/http/compression.py",
     ),
-    ("starlette", "starlette.requests", "cookie_parser"): ("the cookies of a request", "service/http/guard.py"),
-    ("uvicorn", "uvicorn.protocols.http.h11_impl", "H11Protocol.on_response_complete"): (
-        "the end of an answer", "service/http/timeouts.py",
+    ("uvicorn", "uvicorn.protocols.http.h11_impl", "H11Protocol"): (
+        "made as uvicorn makes it, and called as any protocol of asyncio", "service/http/timeouts.py",
     ),
-    ("uvicorn", "uvicorn.protocols.http.h11_impl", "RequestResponseCycle"): (
-        "whether an answer is complete, H11Protocol.cycle", "service/http/timeouts.py",
-    ),
-    ("uvicorn", "uvicorn.server", "Server.startup"): ("the moment at which it listens", "service/http/server.py"),
-    ("uvicorn", "uvicorn.server", "Server.handle_exit"): ("the first signal", "service/http/server.py"),
-    ("uvicorn", "uvicorn.server", "Server.shutdown"): ("the grace of open requests", "service/http/server.py"),
     ("XlsxWriter", "xlsxwriter.worksheet", "Worksheet._xml_number_element"): (
         "numbers with 17 digits", "service/exports/xlsx.py",
     ),
@@ -54,7 +46,7 @@ USED = {
 }  # fmt: skip
 
 #: How the file says it, where not by the attribute's own name.
-SAID = {"UnitsContainer.items": "._units.items()", "RequestResponseCycle": "self.cycle.response_complete"}
+SAID = {"UnitsContainer.items": "._units.items()"}
 #: Private attributes that their owners document.
 DOCUMENTED = {"_asdict", "_fields", "_replace", "_exit"}
 

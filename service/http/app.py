@@ -14,7 +14,7 @@ from typing import Any, Final
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
 from starlette.concurrency import run_in_threadpool
-from starlette.types import ASGIApp
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from sprag_study.service.http import handlers
 from sprag_study.service.http.access import Access
@@ -54,6 +54,7 @@ from sprag_study.service.http.read_ahead import keep_reading_ahead
 from sprag_study.service.http.request_log import Noted, RequestLog
 from sprag_study.service.http.shares import Shares
 from sprag_study.service.http.sound_store import sound_store
+from sprag_study.service.http.timeouts import Answering
 from sprag_study.service.http.web import (
     compare,
     front,
@@ -198,15 +199,14 @@ class Application(FastAPI):
         # FastAPI has its own spans for requests.
         super().__init__(telemetry={"tracer_provider": traces.provider()}, **options)
         self._settings = settings
-        self._access = access
-        self._metrics = metrics
-        self.drain: Drain | None = None
+        guarded = Guard(Noted(Compression(InDecimals(super().__call__))), settings, access)
+        self.drain = Drain(RequestLog(guarded, metrics, access.attempts.address_of))
+        self._layers: ASGIApp = Answering(Prefixed(InLanguage(self.drain), settings.url_prefix))
 
-    def build_middleware_stack(self) -> ASGIApp:
-        """The framework's layers inside the guard."""
-        guarded = Guard(Noted(Compression(InDecimals(super().build_middleware_stack()))), self._settings, self._access)
-        self.drain = Drain(RequestLog(guarded, self._metrics, self._access.attempts.address_of))
-        return Prefixed(InLanguage(self.drain), self._settings.url_prefix)
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """The framework inside the layers of the service."""
+        scope["app"] = self
+        await self._layers(scope, receive, send)
 
     def openapi(self) -> dict[str, Any]:
         """The OpenAPI document, built once."""
@@ -249,7 +249,7 @@ async def _running(
         warming.cancel()
     if preparing is not None:
         preparing.cancel()
-    if isinstance(running, Application) and running.drain is not None:
+    if isinstance(running, Application):
         await running.drain.idle()
     await run_in_threadpool(housekeeping.stop)
     await run_in_threadpool(reporter.stop)

@@ -9,7 +9,7 @@ from typing import Final
 
 import anyio
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.requests import ClientDisconnect, Request, cookie_parser
+from starlette.requests import ClientDisconnect, HTTPConnection, Request
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -171,7 +171,7 @@ class Guard:
             raise ApiError("unavailable", f"The tokens cannot be read: {error}.") from error
         if not self._access.needed:
             return OPEN
-        sent, cookies = headers.getlist("authorization"), cookie_parser(headers.get("cookie", ""))
+        sent, cookies = headers.getlist("authorization"), HTTPConnection(scope).cookies
         try:
             grant = self._access.of_proxy(scope, headers) if not any(map(_is_bearer, sent)) else None
         except ApiError:

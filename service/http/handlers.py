@@ -8,10 +8,10 @@ from typing import Any, cast
 
 from fastapi import FastAPI
 from fastapi.exceptions import RequestValidationError
-from fastapi.routing import iter_route_contexts
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import Response
+from starlette.routing import Route
 
 from sprag_study.sentences import Sentence
 from sprag_study.service.faults import FaultError, shown
@@ -70,9 +70,8 @@ def _left(request: Request, _: Exception) -> Response:
 def _methods_at(app: FastAPI, path: str) -> set[str]:
     """Every method that any route accepts at ``path``; the framework itself names those of one route only."""
     found: set[str] = set()
-    for route in iter_route_contexts(app.routes):
-        pattern = getattr(route, "path_regex", None)
-        if pattern is not None and pattern.match(path):
+    for route in app.routes:
+        if isinstance(route, Route) and route.path_regex.match(path):
             found |= route.methods or set()
     return found | {"OPTIONS"} | ({"HEAD"} if "GET" in found else set())
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 from urllib.parse import parse_qs
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.requests import cookie_parser
+from starlette.requests import HTTPConnection
 from werkzeug.datastructures import LanguageAccept
 from werkzeug.http import parse_accept_header
 
@@ -52,7 +52,7 @@ class InLanguage:
 def _wanted(scope: Scope) -> str:
     headers = Headers(scope=scope)
     query = parse_qs(scope.get("query_string", b"").decode("latin-1")).get(PARAMETER, [""])[-1]
-    for code in (query, cookie_parser(headers.get("cookie", "")).get(COOKIE, "")):
+    for code in (query, HTTPConnection(scope).cookies.get(COOKIE, "")):
         if code in languages.available():
             return code
     return _accepted(headers.get("accept-language", ""))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import os
 import signal
@@ -10,13 +9,15 @@ import socket
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from types import FrameType
-from typing import Protocol
+from typing import Any, Protocol
 
 import psutil
 import uvicorn
+from fastapi import FastAPI
 
 from sprag_study.service import logs
 from sprag_study.service.http.app import create_app
@@ -151,80 +152,43 @@ class Supervisor(threading.Thread):
             self.join()
 
 
-class Server(uvicorn.Server):
-    """A server that notifies the application of the shutdown, so that open streams end too.
+class Ending:
+    """The shutdown: the first signal begins it, and timers end what does not end by itself.
 
     Parameters
     ----------
-    config : uvicorn.Config
     ending : Event
-        Set by the first signal.
+        Set by the first signal, so that open streams end.
     cut : function
         Called in a thread when the grace period is over; makes the remaining requests answer.
     give_up : function
         Called when the service is still running ``last_seconds`` after the signal.
-    listening : function
-        Called once the service listens.
-    certificate : Certificate, optional
-        Read again when its files change.
     """
 
     def __init__(
-        self,
-        config: uvicorn.Config,
-        ending: threading.Event,
-        cut: Callable[[], None],
-        give_up: Callable[[], None],
-        listening: Callable[[], None],
-        last_seconds: float,
-        certificate: Certificate | None = None,
+        self, ending: threading.Event, cut: Callable[[], None], give_up: Callable[[], None], last_seconds: float
     ) -> None:
-        super().__init__(config)
-        self._certificate = certificate
-        self._listening = listening
-        #: Why it could not say that it listens; it ends then.
-        self.failure: OSError | None = None
         self._ending = ending
-        self._cut = cut
-        self._last = threading.Timer(last_seconds, give_up)
-        self._last.daemon = True
+        self._timers = (threading.Timer(_GRACE_SECONDS, cut), threading.Timer(last_seconds, give_up))
 
-    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Begin to listen."""
-        await super().startup(sockets)
-        if self.started:
-            try:
-                self._listening()
-            except OSError as error:  # nobody reads where it says its address
-                self.failure, self.should_exit = error, True
-            self._look_for_renewal()
+    def watch_signals(self) -> None:
+        """Notice the signals that the server handles; in the main thread only."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, partial(self._begin, signal.getsignal(number)))
 
-    def _look_for_renewal(self) -> None:
-        """Read the certificate again if it has changed, now and from then on."""
-        context = self.config.ssl
-        if self._certificate is not None and context is not None:
-            self._certificate.renew(context)
-            asyncio.get_running_loop().call_later(LOOK_SECONDS, self._look_for_renewal)
-
-    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """A signal requests the shutdown."""
+    def _begin(self, handler: Any, number: int, frame: FrameType | None) -> None:
         if not self._ending.is_set():
             self._ending.set()
-            self._last.start()
-        super().handle_exit(sig, frame)
+            for timer in self._timers:
+                timer.daemon = True
+                timer.start()
+        if callable(handler):
+            handler(number, frame)
 
     def ended(self) -> None:
-        """Cancel the forced exit, because everything has ended in time."""
-        self._last.cancel()
-
-    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Let requests finish, then cancel them."""
-        loop = asyncio.get_running_loop()
-        cutting = loop.call_later(_GRACE_SECONDS, lambda: loop.run_in_executor(None, self._cut))
-        try:
-            await super().shutdown(sockets)
-        finally:
-            cutting.cancel()
+        """Everything has ended in time."""
+        for timer in self._timers:
+            timer.cancel()
 
 
 def _give_up() -> None:
@@ -249,7 +213,49 @@ def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) 
     app = create_app(settings)  # initialises the database before the dispatcher opens it
     listener = _listen(settings)
     address = settings.address(listener.getsockname()[1])
-    config = uvicorn.Config(
+    context = app.state.context
+    supervisor = Supervisor(
+        lambda: start_dispatcher_process(worker_settings(settings)),
+        leaving=context.ending,
+        stop_seconds=settings.stop_seconds / 2.0,
+    )
+    app.state.readiness.watch(supervisor.failing)
+    ending = Ending(context.ending, context.cut, _give_up, settings.stop_seconds)
+    failure: OSError | None = None
+
+    async def look() -> None:
+        """Called as soon as the service listens, and every `LOOK_SECONDS` from then on."""
+        nonlocal failure
+        if supervisor.ident is None and failure is None:
+            if threading.current_thread() is threading.main_thread():
+                ending.watch_signals()
+            try:
+                (announce or _say)(address)
+            except OSError as error:  # nobody reads where it says its address
+                failure, server.should_exit = error, True
+                return
+            supervisor.start()
+        if certificate is not None and config.ssl is not None:
+            certificate.renew(config.ssl)
+
+    config = _config(app, certificate, look)
+    server = uvicorn.Server(config)
+    note_settings(context.store, context.origins)
+    with listener, _outlived_signals():
+        try:
+            with suppress(KeyboardInterrupt):
+                server.run(sockets=[listener])
+        finally:
+            supervisor.stop()
+            ending.ended()
+            traces.stop()
+        if failure is not None:
+            raise failure
+
+
+def _config(app: FastAPI, certificate: Certificate | None, look: Callable[[], Awaitable[None]]) -> uvicorn.Config:
+    """How uvicorn serves ``app``. It calls ``look`` as soon as it listens, and from time to time."""
+    return uvicorn.Config(
         app,
         log_config=None,
         log_level=logging.WARNING,
@@ -261,33 +267,11 @@ def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) 
         proxy_headers=False,
         timeout_graceful_shutdown=int(_GRACE_SECONDS) + _ANSWER_SECONDS,
         lifespan="on",
+        callback_notify=look,
+        timeout_notify=LOOK_SECONDS,
         ssl_certfile=None if certificate is None else certificate.file,
         ssl_keyfile=None if certificate is None else certificate.key,
     )
-    note_settings(app.state.context.store, app.state.context.origins)
-    supervisor = Supervisor(
-        lambda: start_dispatcher_process(worker_settings(settings)),
-        leaving=app.state.context.ending,
-        stop_seconds=settings.stop_seconds / 2.0,
-    )
-    app.state.readiness.watch(supervisor.failing)
-    with listener, _outlived_signals():
-
-        def listening() -> None:
-            (announce or _say)(address)
-            supervisor.start()
-
-        context = app.state.context
-        server = Server(config, context.ending, context.cut, _give_up, listening, settings.stop_seconds, certificate)
-        try:
-            with suppress(KeyboardInterrupt):
-                server.run(sockets=[listener])
-        finally:
-            supervisor.stop()
-            traces.stop()
-            server.ended()
-        if server.failure is not None:
-            raise server.failure
 
 
 def _say(address: str) -> None:

@@ -1,16 +1,28 @@
 """Timeouts of connections: those that neither send nor receive are closed.
 
-The server itself waits indefinitely for the head of a request, and for clients that do not read their answer.
+The server itself waits indefinitely for the head of a request, and for clients that do not read their answer. Its
+protocol is used by the methods that every protocol of asyncio has; when a request is answered, the application tells.
 """
 
 from __future__ import annotations
 
 import asyncio
-from typing import Any, Final
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, Final
 
+from starlette.datastructures import Headers
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from sprag_study.worker.limits import HEAD_SECONDS, MAX_HEAD_BYTES, WRITE_SECONDS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from starlette.types import ASGIApp, Message, Receive, Scope, Send
+    from uvicorn import Config
+
+#: The open connections by both of their ends, as the scope of a request has them.
+_OPEN: Final[dict[tuple[Any, Any], TimeoutProtocol]] = {}
 
 
 class TimeoutProtocol(H11Protocol):
@@ -23,53 +35,59 @@ class TimeoutProtocol(H11Protocol):
     head_seconds = HEAD_SECONDS
     write_seconds = WRITE_SECONDS
 
-    def __init__(self, *arguments: Any, **options: Any) -> None:
-        super().__init__(*arguments, **options)
+    def __init__(self, config: Config, *others: Any, **options: Any) -> None:
+        super().__init__(config, *others, **options)
+        self._most = config.limit_concurrency
+        self._ends: tuple[Any, Any] = (None, None)
         self._head: asyncio.TimerHandle | None = None
         self._write: asyncio.TimerHandle | None = None
+        #: Requests that are being answered: with pipelining, one can begin before another is over.
+        self._requests = 0
         self._since = 0.0
+        #: Whether nothing more of the current request is to come.
+        self.whole = False
+
+    @property
+    def waiting(self) -> bool:
+        """Whether no request is there, or only a part of one."""
+        return not self._requests or not self.whole
+
+    @contextmanager
+    def answering(self) -> Iterator[None]:
+        """A block in which a request, of which the head has come, is answered."""
+        self._requests, self._head = self._requests + 1, _stopped(self._head)
+        try:
+            yield
+        finally:
+            self._requests, self._since = self._requests - 1, self._clock.time()
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """A client connects; wait for its request."""
         super().connection_made(transport)
-        self._since = self.loop.time()
+        self._connection, self._clock = transport, asyncio.get_running_loop()
+        self._ends = (_place(transport.get_extra_info("sockname")), _place(transport.get_extra_info("peername")))
+        _OPEN[self._ends] = self
+        self._since = self._clock.time()
         self._await_head()
         self._make_room()
 
     def _make_room(self) -> None:
         """Close the connection that has waited longest for a whole request, where all places are taken."""
-        if self.limit_concurrency is None or len(self.connections) < self.limit_concurrency:
+        if self._most is None or len(_OPEN) < self._most:
             return
-        others = (other for other in self.connections if isinstance(other, TimeoutProtocol) and other is not self)
-        oldest = min((other for other in others if other.waiting), key=lambda other: other.since, default=None)
+        here = [other for (server, _), other in _OPEN.items() if server == self._ends[0]]
+        if len(here) < self._most:
+            return
+        others = (other for other in here if other.waiting and other is not self)
+        oldest = min(others, key=lambda other: other._since, default=None)
         if oldest is not None:
-            self.connections.discard(oldest)  # now, and not when it is told that it is closed
-            oldest.transport.abort()
-
-    @property
-    def since(self) -> float:
-        """When the connection began to wait for its current request, by the clock of the loop."""
-        return self._since
-
-    @property
-    def waiting(self) -> bool:
-        """Whether no request is there, or only a part of one."""
-        return not self._busy() or bool(self.cycle.more_body)
+            oldest._abort()
 
     def data_received(self, data: bytes) -> None:
         """Part of a request arrives."""
         super().data_received(data)
-        if self._busy():
-            self._head = _stopped(self._head)
-        elif self._head is None:
+        if not self._requests and self._head is None:
             self._await_head()
-
-    def on_response_complete(self) -> None:
-        """An answer is complete; the timeout applies to the head of a request that follows it."""
-        super().on_response_complete()
-        self._since = self.loop.time()
-        if self._busy():
-            self._head = _stopped(self._head)
 
     def pause_writing(self) -> None:
         """The client stops reading."""
@@ -84,24 +102,56 @@ class TimeoutProtocol(H11Protocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """The client disconnects."""
         self._head, self._write = _stopped(self._head), _stopped(self._write)
+        if _OPEN.get(self._ends) is self:
+            del _OPEN[self._ends]
         super().connection_lost(exc)
 
+    def _abort(self) -> None:
+        _OPEN.pop(self._ends, None)  # now, and not when it is told that it is closed
+        self._connection.abort()
+
     def _await_head(self) -> None:
-        self._head = self.loop.call_later(self.head_seconds, self.transport.abort)
+        self._head = self._clock.call_later(self.head_seconds, self._abort)
 
     def _await_read(self) -> None:
         _stopped(self._write)
-        self._write = self.loop.call_later(self.write_seconds, self._look, self.transport.get_write_buffer_size())
+        self._write = self._clock.call_later(self.write_seconds, self._look, self._connection.get_write_buffer_size())
 
     def _look(self, unread: int) -> None:
         """Disconnect a client that has read nothing of its answer since ``unread`` bytes were left of it."""
-        if self.transport.get_write_buffer_size() < unread:
+        if self._connection.get_write_buffer_size() < unread:
             self._await_read()
         else:
-            self.transport.abort()
+            self._abort()
 
-    def _busy(self) -> bool:
-        return self.cycle is not None and not self.cycle.response_complete
+
+class Answering:
+    """ASGI application around the service: tells the connection of a request when it begins and ends."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        ends = (_place(scope.get("server")), _place(scope.get("client")))
+        connection = _OPEN.get(ends) if scope["type"] == "http" else None
+        if connection is None:
+            await self._app(scope, receive, send)
+            return
+
+        async def noted() -> Message:
+            message = await receive()
+            connection.whole = not message.get("more_body", False)
+            return message
+
+        headers = Headers(scope=scope)
+        connection.whole = headers.get("content-length", "0") == "0" and "transfer-encoding" not in headers
+        with connection.answering():
+            await self._app(scope, noted, send)
+
+
+def _place(end: Any) -> Any:
+    """Host and port of an end of a connection, also where its protocol is IPv6; None where it has none."""
+    return tuple(end[:2]) if isinstance(end, tuple | list) else None
 
 
 def _stopped(timer: asyncio.TimerHandle | None) -> asyncio.TimerHandle | None:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger("sprag.service")
 
 #: Seconds between two looks for a renewed certificate.
-LOOK_SECONDS: Final = 60.0
+LOOK_SECONDS: Final = 60
 
 
 class CertificateError(Exception):

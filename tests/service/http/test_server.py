@@ -12,7 +12,7 @@ import httpx
 import pytest
 
 from sprag_study.service.http import app
-from sprag_study.service.http.server import AddressError, Supervisor, serve
+from sprag_study.service.http.server import AddressError, Ending, Supervisor, serve
 from sprag_study.service.storage.errors import DatabaseError
 from sprag_study.worker.pool.child_pool import JobStoppedError
 from tests.worker.fakes import HandClock
@@ -187,6 +187,31 @@ def test_the_address_is_told_while_the_processes_that_check_still_start(
         for thread in threading.enumerate()
         if isinstance(thread, threading.Timer) and not thread.finished.is_set()
     ]
+
+
+def test_a_second_signal_reaches_the_server_and_the_grace_ends_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sprag_study.service.http.server._GRACE_SECONDS", 0.01)
+    ending, over, cuts, seen = threading.Event(), threading.Event(), [], []
+
+    def cut() -> None:
+        cuts.append(1)
+        over.set()
+
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        for number in before:
+            signal.signal(number, lambda number, _frame: seen.append(number))
+        shutdown = Ending(ending, cut, lambda: seen.append(0), last_seconds=600.0)
+        shutdown.watch_signals()
+        signal.raise_signal(signal.SIGTERM)
+        signal.raise_signal(signal.SIGINT)
+        assert ending.is_set()
+        assert over.wait(60)
+        shutdown.ended()
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    assert (cuts, seen) == ([1], [signal.SIGTERM, signal.SIGINT])
 
 
 def test_a_supervisor_that_never_started_can_be_stopped() -> None:

@@ -12,7 +12,6 @@ from typing import Any
 import httpx
 import pytest
 import uvicorn
-from uvicorn.protocols.http.flow_control import FlowControl
 from uvicorn.server import ServerState
 
 from sprag_study.service.http import guard
@@ -156,13 +155,15 @@ def test_a_long_answer_is_cut_only_where_nothing_of_it_is_read() -> None:
         config = uvicorn.Config(lambda: None, http=TimeoutProtocol, log_config=None)
         config.load()
         protocol = TimeoutProtocol(config, ServerState(), {}, _loop=clock)
-        protocol.transport, protocol.flow = connection, FlowControl(connection)
-        protocol.pause_writing()
+        protocol.connection_made(connection)
         found = []
-        for read in (65536, 1, 65536, 0):
-            connection.unread -= read
-            await pass_time(TimeoutProtocol.write_seconds + 1.0)
-            found.append(connection.open)
+        with protocol.answering():
+            protocol.pause_writing()
+            for read in (65536, 1, 65536, 0):
+                connection.unread -= read
+                await pass_time(TimeoutProtocol.write_seconds + 1.0)
+                found.append(connection.open)
+        protocol.connection_lost(ConnectionAbortedError())
         return found
 
     try:
