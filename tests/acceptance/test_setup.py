@@ -16,7 +16,7 @@ from tests.acceptance.processes import ROOT
 
 PACKAGES = ("sprag_study", "engine", "worker", "service", "migrations")  # folders; all are parts of sprag_study
 #: Extras of the program itself, beside its dependencies.
-RUNTIME = ("tables", "frames", "server", "report", "postgres", "cluster")
+RUNTIME = ("tables", "frames", "server", "report", "postgres", "cluster", "oidc", "traces")
 CONSTRAINTS = (ROOT / "constraints.txt").read_text()
 
 
