@@ -126,7 +126,8 @@ def set_clutch(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, state: int) -
         elif kind == _AT_FIRST:
             edge = W[base + lay.p_law, lane]
         elif kind == _IF_DAMPED:
-            edge = 0.0 if W[base + lay.p_clutch_damping, lane] > 0.0 else -NEVER
+            if lay.drag == 1 and W[base + lay.p_clutch_damping, lane] > 0.0:
+                edge = 0.0
         elif kind != 0:
             edge = 0.0
         W[base + lay.p_w_low + band, lane] = edge
@@ -143,11 +144,12 @@ def set_clutch(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, state: int) -
             if k == 0:
                 value = law(W, base + lay.p_law, lay.coefficients, lane, limit) - rate * limit
         W[base + lay.p_force + k, lane] = value
-    W[base + lay.p_rate, lane] = 0.0
-    if state == FREE:
-        W[base + lay.p_rate, lane] = W[base + lay.p_overrunning_damping, lane]
-    elif ENGAGED <= state <= BEYOND:
-        W[base + lay.p_rate, lane] = W[base + lay.p_clutch_damping, lane]
+    if lay.drag == 1:
+        W[base + lay.p_rate, lane] = 0.0
+        if state == FREE:
+            W[base + lay.p_rate, lane] = W[base + lay.p_overrunning_damping, lane]
+        elif ENGAGED <= state <= BEYOND:
+            W[base + lay.p_rate, lane] = W[base + lay.p_clutch_damping, lane]
     W[base + lay.p_locked, lane] = 1.0 if state == LOCKED else 0.0
     W[base + lay.p_engaged, lane] = 1.0 if state >= ENGAGED else 0.0
     W[base + lay.p_beyond, lane] = 1.0 if state == BEYOND else 0.0
@@ -170,7 +172,7 @@ def count_event(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
 @part
 def is_held(W: Floats, lay: Layout, lane: int) -> bool:
     """Whether the shaft is held when it stands: without a load and a backstop nothing does."""
-    return bool(W[lay.load, lane] > 0.0 or W[lay.backstop, lane] > 0.0)
+    return bool(W[lay.load, lane] > 0.0 or (lay.drag == 1 and W[lay.backstop, lane] > 0.0))
 
 
 @part
