@@ -92,7 +92,11 @@ def backup(
     file: Annotated[str, typer.Argument(metavar="FILE", help="File to write; it must not exist.")],
     db: Database = None,
 ) -> None:
-    """Write a consistent copy of the database while others use it. Exit code 3: rows in it changed on the disk."""
+    """Write a consistent copy of the database while others use it. Exit code 3: rows in it changed on the disk.
+
+    The copy is a database: to restore it, stop Sprag, start it with `sprag serve --db FILE`, and confirm it with `sprag
+    admin db adopt --db FILE`.
+    """
     from sprag_study.service.storage.maintenance import backup as write_copy
 
     target = Path(file)

@@ -94,7 +94,8 @@ def add(
         store,
         record,
         _(
-            "{name} is a user: {role}; every request to a service of this database now needs a token",
+            "{name} is a user: {role}; every request to a service of this database now needs a token, which `sprag "
+            "admin token create --user {name} --name PURPOSE` prints",
             name=record.name,
             role=record.role,
         ),

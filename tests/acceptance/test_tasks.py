@@ -88,6 +88,8 @@ def test_a_service_and_its_administration(
         for line in (*lines(SERVICE), *lines(ADMINISTRATION)):
             typed(line, sprag, monkeypatch)
         assert "feeder, first" in sprag("list").out
+        added = sprag("admin", "user", "add", "carla").err
+        assert "`sprag admin token create --user carla --name PURPOSE` prints" in added
         monkeypatch.delenv("SPRAG_TOKEN")
         refused = sprag("list")
         assert (refused.code, "or keep it with `sprag login`" in refused.err) == (3, True)
