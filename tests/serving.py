@@ -14,9 +14,9 @@ from sprag_study.service.http.timeouts import TimeoutProtocol
 
 
 @contextmanager
-def served(app: Any) -> Iterator[str]:
-    """The address of a server of ``app`` in a thread, which has ended when the block is left."""
-    config = uvicorn.Config(app, port=0, http=TimeoutProtocol, ws="none", log_config=None, server_header=False)
+def served(app: Any, port: int = 0) -> Iterator[str]:
+    """The address of a server of ``app`` in a thread, which has ended when the block is left; by default any port."""
+    config = uvicorn.Config(app, port=port, http=TimeoutProtocol, ws="none", log_config=None, server_header=False)
     server = uvicorn.Server(config)
     thread = threading.Thread(target=server.run)
     thread.start()

@@ -6,25 +6,27 @@ import itertools
 import re
 from typing import TYPE_CHECKING
 
-import httpx
 import pytest
 from playwright.sync_api import expect
 from starlette.concurrency import run_in_threadpool
 
 from benchmarks.faults.harness import free_port
 from sprag_study.service.http import looks as looking
-from tests.acceptance.processes import SECONDS, service
+from tests.acceptance.processes import SECONDS
+from tests.service.conftest import in_process
 from tests.service.timed_spec import SPEC
+from tests.serving import served
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from collections.abc import Callable
 
+    import httpx
     from playwright.sync_api import Browser, Page
 
+    from sprag_study.service.settings import Settings
     from tests.service.conftest import Service
 
 LOST = "The connection to the service is lost"
-LONG = {"axes": [{"path": "shaft.load", "linspace": [0, 1, 100_000]}]}
 SCHEDULE = {"spec": SPEC, "cron": "0 22 * * *", "name": "Nightly"}
 
 
@@ -79,14 +81,17 @@ def kept(page: Page, name: str) -> None:
         expect(page.locator('[name="/name"]')).to_have_value("Half a na")
 
 
-def test_every_kind_of_page_outlives_a_stop_of_the_service(browser: Browser, tmp_path: Path) -> None:
+def test_every_kind_of_page_outlives_a_stop_of_the_service(
+    browser: Browser, settings: Settings, connect: Callable[..., httpx.Client]
+) -> None:
     """Every page finds the service again; lists show what changed, and what somebody began is kept."""
-    options = ("--port", free_port())
-    with service(tmp_path, *options, SPRAG_PROCESSES="1") as running, httpx.Client(base_url=running.address) as client:
-        client.timeout = SECONDS
-        study = client.post("/api/v1/studies", json={**SPEC, **LONG, "name": "Before"}).json()["id"]
-        client.post(f"/api/v1/studies/{study}:pause")
-        schedule = client.post("/api/v1/schedules", json=SCHEDULE).json()["id"]
+    port = free_port()
+    with in_process(settings, connect) as service, served(service.app, port) as address:
+        study = service.submit({**SPEC, "name": "Before"})
+        service.fill(study, range(4))
+        service.http.post(f"/api/v1/studies/{study}:pause")
+        schedule = service.http.post("/api/v1/schedules", json=SCHEDULE).json()["id"]
+        service.store.work.take_over("the first")
         addresses = {
             "list": "/",
             "study": f"/studies/{study}",
@@ -96,7 +101,7 @@ def test_every_kind_of_page_outlives_a_stop_of_the_service(browser: Browser, tmp
             "form": "/new?preset=one_pendulum",
         }
         # Each in a window of its own: a browser has few connections to a host, and one window shows one tab.
-        pages = {name: browser.new_context(base_url=running.address).new_page() for name in addresses}
+        pages = {name: browser.new_context(base_url=address).new_page() for name in addresses}
         for name, page in pages.items():
             page.set_default_timeout(1000 * SECONDS)
             page.goto(addresses[name])
@@ -105,15 +110,16 @@ def test_every_kind_of_page_outlives_a_stop_of_the_service(browser: Browser, tmp
         dispatcher = pages["workers"].locator("#workers h2")
         expect(dispatcher).to_have_count(1)
         before = dispatcher.inner_text()
+        service.app.state.context.ending.set()  # as a service that is stopped ends its streams
     for name, page in pages.items():
         if name == "form":
             page.locator('[name="/axes/0/count"]').fill("7")  # learns it from its next request
         expect(page.get_by_role("alert").filter(has_text=LOST)).to_be_visible()
-    with service(tmp_path, *options, SPRAG_PROCESSES="1") as running, httpx.Client(base_url=running.address) as client:
-        client.timeout = SECONDS
-        client.post("/api/v1/studies", json={**SPEC, "name": "After"})
-        client.post(f"/api/v1/studies/{study}:cancel")
-        client.patch(f"/api/v1/schedules/{schedule}", json={"name": "Changed"})
+    with in_process(settings, connect) as service, served(service.app, port):
+        service.submit({**SPEC, "name": "After"})
+        service.http.post(f"/api/v1/studies/{study}:cancel")
+        service.store.work.settle(service.store.work.take_over("the second"), service.store.studies.get(study).number)
+        service.http.patch(f"/api/v1/schedules/{schedule}", json={"name": "Changed"})
         for page in pages.values():
             page.get_by_role("button", name="Try now").evaluate_all("buttons => buttons.forEach((one) => one.click())")
             expect(page.locator(".link-lost")).to_have_count(0)
@@ -125,3 +131,4 @@ def test_every_kind_of_page_outlives_a_stop_of_the_service(browser: Browser, tmp
         for name, page in pages.items():
             kept(page, name)
             page.context.close()
+        service.app.state.context.ending.set()
