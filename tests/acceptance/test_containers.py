@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import stat
 import subprocess
@@ -131,6 +132,7 @@ def test_the_health_check_asks_where_the_service_listens(
         until(
             lambda: "Sprag serves at https://" in log.read_text() or process.poll() is not None, "the service listens"
         )
+        assert re.search(r"Sprag serves at https://\S+:\d+/sprag\b", log.read_text())
         image.run(image.health, **variables)
         process.send_signal(signal.SIGTERM)
         assert process.wait(600) == 0, log.read_text()
