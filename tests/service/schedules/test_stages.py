@@ -7,10 +7,13 @@ from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING
 
+import pytest
+
 from sprag_study.service.jobs.scheduler import Scheduler
 from sprag_study.service.schedules.outcomes import Outcome
 from sprag_study.service.schedules.stages import StageTime, StudyTimes, report_stages, study_stages
 from sprag_study.worker.stages import Stage
+from tests.service.schedule_command import runner
 from tests.service.schedules.test_outcomes import due_at_one, last
 
 if TYPE_CHECKING:
@@ -124,3 +127,15 @@ def test_the_page_says_what_took_longest(service: Service, clock: Clock) -> None
         "Waiting for its first case", "Compiling", "Computing", "Writing rows", "Making the report",
     ]  # fmt: skip
     assert "Обчислення" in service.http.get("/nights?hours=744", headers={"Accept-Language": "uk"}).text
+
+
+def test_the_command_shows_them_on_the_clock_of_the_schedule(
+    service: Service, clock: Clock, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    night_of(service, clock)
+    run = runner(service, monkeypatch, capsys)
+    code, out, _ = run("night", "--hours", "744", "--stages")
+    assert code == 4  # no case ended ok
+    lines = [" ".join(line.split()) for line in out.splitlines()]
+    assert any("Computing" in line and "02:10" in line and "02:40" in line and "29 min 58 s" in line for line in lines)
+    assert "Computing" not in run("night", "--hours", "744")[1]
