@@ -50,6 +50,7 @@ from sprag_study.service.reading.wording import unit_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from collections.abc import Set as AbstractSet
 
     from sprag_study.service.figures.figure import Figure, Fill, Panel, Quantity
 
@@ -181,7 +182,7 @@ class _Painting(Painting):
         columns = self._columns()
         # Names stand at curves where they find a place, so panels come before the legend above them.
         rows = [self._row(row, columns) for row in range(figure.rows)]
-        self._legend(named=any(named for row in rows for named in row.named))
+        self._legend({name for row in rows for names in row.named for name in names})
         for place, row in enumerate(rows):
             self._add(row, last=place == len(rows) - 1, columns=columns)
         entries = list(mark_entries(figure, self._patterns))
@@ -252,9 +253,10 @@ class _Painting(Painting):
             )  # fmt: skip
             parts, named = panel_parts(placed)
             made.placed.append((placed, parts))
-            made.named.append(bool(named))
+            names = {one.text for one in named}
+            made.named.append(names)
             title = _title_lines(panel.y, column.width + column.numbers)
-            legend = self._own_legend(panel, column, named=bool(named))
+            legend = self._own_legend(panel, column, names)
             made.titles.append((title, legend))
             made.head = max(made.head, LINE * len(title) + legend.height + _GAP)
         return made
@@ -328,10 +330,10 @@ class _Painting(Painting):
 
     # Legends --------------------------------------------------------------------------------------------------------
 
-    def _own_legend(self, panel: Panel, column: _Column, *, named: bool) -> Rows:
+    def _own_legend(self, panel: Panel, column: _Column, named: AbstractSet[str]) -> Rows:
         """The legend of a panel whose lines are its own: what is not named at its curve."""
         figure = self._figure
-        listed = [line for line in panel.lines if line.listed and not (named and line.joined)]
+        listed = [line for line in panel.lines if line.listed and not (line.joined and line.name in named)]
         if not (figure.motion or figure.apart) or figure.family or len(listed) < (1 if named else 2):
             return Rows([], 0.0)
         return rows_of(map(line_entry, map(self._seen, listed)), column.width + column.numbers)
@@ -347,11 +349,12 @@ class _Painting(Painting):
         own = line.key == self._chosen
         return replace(line, colour=colour_beside(line.key, line.colour, self._chosen), wide=line.wide or own)
 
-    def _legend(self, *, named: bool) -> None:
-        """The legend of the lines that all panels have: what stands at no curve."""
+    def _legend(self, named: AbstractSet[str]) -> None:
+        """The legend of the lines that all panels have: what stands at no curve; ``named`` are those that do."""
         figure = self._figure
         own = (figure.motion or figure.apart) and not figure.family
-        listed = [] if own else [line for line in figure.listed if not (named and line.joined and not line.heading)]
+        unnamed = (line for line in figure.listed if line.heading or not (line.joined and line.name in named))
+        listed = [] if own else list(unnamed)
         fills = [] if own else [fill for panel in figure.panels for fill in panel.fills if fill.listed]
         heading = ", ".join(map(title_of, figure.family)) or (gettext("Study") if figure.studies > 1 else "")
         listed = list(map(self._seen, listed))
@@ -367,10 +370,10 @@ class _Painting(Painting):
 
 @dataclass(slots=True)
 class _Row:
-    """A row of panels: with their parts, whether their curves are named, titles and legends, and their height."""
+    """A row of panels: with their parts, the names at their curves, titles and legends, and their height."""
 
     placed: list[tuple[Placed, list[str]]]
-    named: list[bool]
+    named: list[set[str]]
     titles: list[tuple[list[str], Rows]]
     head: float
 

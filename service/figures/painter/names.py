@@ -15,9 +15,10 @@ if TYPE_CHECKING:
 
     Numbers = NDArray[np.float64]
 
-#: Most curves that are named there, and the widest name (px); a legend has more.
+#: Most curves of which some are named there, and the widest name: in px, or where a panel is wide, its share of the
+#: width. A legend has the others.
 MOST_NAMED: Final = 8
-_WIDEST: Final = 190.0
+_WIDEST: Final = (190.0, 0.45)
 #: Pixels between points that stand for a curve, from a curve to its name, and to the nearest other one at best.
 _STEP: Final = 4.0
 _NEAR: Final = 3.0
@@ -57,8 +58,8 @@ def named_curves(
     taken: Sequence[Box],
     size: tuple[float, float],
     chosen: int | None = None,
-) -> list[Named] | None:
-    """The names of all curves at places of their own; None where one has none.
+) -> list[Named]:
+    """The names of curves that find places of their own; none where there are too many curves.
 
     Parameters
     ----------
@@ -68,23 +69,22 @@ def named_curves(
     size : width and height of the panel
     chosen : the curve whose name is bold
     """
-    if not curves or len(curves) > MOST_NAMED or any(text_width(name, SMALL) > _WIDEST for name, _, _ in curves):
-        return None
-    dots = [dense(x, y) for _, x, y in curves]
-    if any(own.shape[0] == 0 for own in dots):
-        return None
+    if len(curves) > MOST_NAMED:
+        return []
+    dots, widest = [dense(x, y) for _, x, y in curves], max(_WIDEST[0], _WIDEST[1] * size[0])
     rest = [dense(x, y) for x, y in others]
-    boxes, found = list(taken), list[Named | None]([None] * len(curves))
+    boxes, found = list(taken), dict[int, Named]()
     # The curves with the fewest points have the fewest places.
     for index in sorted(range(len(curves)), key=lambda place: dots[place].shape[0]):
         name = curves[index][0]
+        if not dots[index].shape[0] or text_width(name, SMALL) > widest:
+            continue
         alien = np.concatenate([*(own for place, own in enumerate(dots) if place != index), *rest, np.empty((0, 2))])
         best = _best(name, dots[index], alien, boxes, size, bold=index == chosen)
-        if best is None:
-            return None
-        found[index] = Named(name, best.left, best.bottom - 2.0, index == chosen)
-        boxes.append(best)
-    return [one for one in found if one is not None]
+        if best is not None:
+            found[index] = Named(name, best.left, best.bottom - 2.0, index == chosen)
+            boxes.append(best)
+    return [found[index] for index in sorted(found)]
 
 
 def clearest(places: Sequence[Box], lines: Sequence[Numbers], taken: Sequence[Box]) -> Box:

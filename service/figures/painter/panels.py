@@ -342,7 +342,7 @@ def _beside(placed: Placed, x: float, y: float, wide: float, on_the_right: bool)
 def _names(
     placed: Placed, curves: dict[int, tuple[NDArray[np.int64], Numbers, Numbers]], boxes: list[Box]
 ) -> list[Named]:
-    """The names at the curves of a panel; none where they do not all find a place."""
+    """The names at the curves of a panel, of those that find a place."""
     lines = placed.panel.lines
     distinct = {line.name for line in lines if line.joined and line.name}
     own = [index for index, line in enumerate(lines) if line.joined and line.name and not line.heading]
@@ -351,7 +351,7 @@ def _names(
     curved = [(lines[index].name, *curves[index][1:]) for index in own]
     others = [curves[index][1:] for index in curves if index not in own]
     chosen = next((at for at, index in enumerate(own) if placed.chosen and lines[index].key == placed.chosen), None)
-    return named_curves(curved, others, boxes, (placed.width, placed.height), chosen) or []
+    return named_curves(curved, others, boxes, (placed.width, placed.height), chosen)
 
 
 def scale_parts(figure: Figure, panel: Panel, height: float) -> list[str]:

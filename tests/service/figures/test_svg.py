@@ -159,3 +159,14 @@ def test_a_number_at_a_point_stands_where_no_curve_runs() -> None:
     points = np.array(re.findall(r"-?[\d.]+", path), dtype=np.float64).reshape(-1, 2)
     box = Box(left, base - 11.0, left + text_width("3.37 W", SMALL), base + 3.0)
     assert distance(box, dense(points[:, 0], points[:, 1])) >= 2.9
+
+
+def test_curves_are_named_as_far_as_names_fit_and_a_legend_has_the_others() -> None:
+    x = np.linspace(0.0, 1.0, 20)
+    long = "A study whose name is far too long to stand at its curve in a chart of this width, even alone"
+    lines = (Line("rising", x, x, PALETTE[0]), Line(long, x, 1.0 - x, PALETTE[1], 1))
+    text = svg(Figure(Quantity("x", "1"), (Panel(Quantity("y", "1"), lines),)), width=500)
+    at_curves = re.findall(r'<text[^>]*class="name"[^>]*>([^<]*)<', text)
+    assert at_curves == ["rising"]
+    assert text.count(">rising<") == 1, "not in the legend too"
+    assert ">A study whose name" in text
