@@ -152,6 +152,8 @@ def joined(separator: str, parts: Iterable[Part]) -> Phrase:
 
 
 _RADIANS: Final = "rad"
+#: Digits of a number in a column, at most.
+_MOST_DIGITS: Final = 12
 
 
 def _short(value: Any, digits: int) -> bool:
@@ -238,15 +240,25 @@ class Reading:
         return self.units.cell(value, si)
 
     def quantity(self, value: Any, si: str, digits: int = 5) -> str:
-        """A number in SI as people read it, with its unit.
+        """A number in SI as people read it, with its unit; the unit is that of `number_and_unit`."""
+        shown, unit = self._readable(value, si, digits)
+        return f"{number(shown, digits)} {unit_text(unit)}".strip()
+
+    def number_and_unit(self, value: float | str | None, si: str, digits: int = 8) -> tuple[str, str]:
+        """As `quantity`, for columns of numbers and units, with more digits where those give the number exactly.
 
         An angle that was given in radians stays in them where it has no short number of degrees, so that it can be
-        typed back.
+        typed back. Texts are as they are.
         """
+        shown, unit = self._readable(value, si, _MOST_DIGITS)
+        exact = next((more for more in range(digits, _MOST_DIGITS + 1) if _short(shown, more)), digits)
+        return number(shown, exact), unit_text(unit)
+
+    def _readable(self, value: Any, si: str, digits: int) -> tuple[Any, str]:
         shown, unit = self.value(value, si), self.unit(si)
         if si == _RADIANS and unit != si and _short(value, digits) and not _short(shown, digits):
-            shown, unit = value, si
-        return f"{number(shown, digits)} {unit_text(unit)}".strip()
+            return value, si
+        return shown, unit
 
     def typed(self, text: str, si: str) -> str:
         """What somebody typed beside a label with the shown unit: a bare number gets this unit."""

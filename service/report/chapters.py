@@ -224,8 +224,7 @@ def _inputs(report: Report) -> Iterator[Block]:
     for item in report.inputs:
         name = read.caption(item.path) if item.unit else choice_name(item)
         origin = _(_ORIGINS.get(item.origin, item.origin))
-        unit = "" if item.origin == "derived" else unit_text(read.unit(item.unit))  # a formula has its units
-        rows.append((name, _value(report, item), unit, origin, item.path))
+        rows.append((name, *_value(report, item), origin, item.path))
     rows += [(_("Run: {name}", name=lower_first(label)), value, "", _(_ORIGINS.get(item.origin, item.origin)),
               f"run.{item.path}") for label, value, item in run_settings(report.study, report.spec, read)]  # fmt: skip
     heads = (_("Parameter"), _("Value"), _("Unit"), _("Origin"), _("Name in specs"))
@@ -233,14 +232,12 @@ def _inputs(report: Report) -> Iterator[Block]:
     yield Table(heads if coded else heads[:-1], tuple(row if coded else row[:-1] for row in rows), (1,))
 
 
-def _value(report: Report, item: Input) -> str:
-    """The value of an input in its unit, that of one that varies in a word, a formula with names of quantities."""
-    if item.origin == "axes":
-        return _("varies")
+def _value(report: Report, item: Input) -> tuple[str, str]:
+    """The value of an input and its unit, that of one that varies in a word, a formula with names of quantities."""
     if item.origin == "derived":
-        return formula_text(item, report.reading)
-    value = report.reading.value(in_words(item), item.unit)
-    return value if isinstance(value, str) else number(value, _DIGITS)
+        return formula_text(item, report.reading), ""  # a formula has its units
+    value, unit = report.reading.number_and_unit(in_words(item), item.unit)
+    return (_("varies") if item.origin == "axes" else value), unit
 
 
 def _given(report: Report) -> Iterator[Block]:

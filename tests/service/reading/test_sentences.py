@@ -10,6 +10,7 @@ from dataclasses import replace
 from functools import cache
 from typing import get_args
 
+import numpy as np
 import pytest
 
 from sprag_study.sentences import (
@@ -33,6 +34,7 @@ from sprag_study.service.languages.recorded import MANY_STUDIES, NOT_IN_TIME
 from sprag_study.service.reading.part_names import part_name
 from sprag_study.service.reading.quantities import Units
 from sprag_study.service.reading.reader import Phrase, Reading, shown, shown_stored
+from sprag_study.service.reading.units import parse_quantity
 from sprag_study.service.storage.errors import StudyNotFoundError
 from sprag_study.service.storage.stored_sentences import read_warnings, write_warnings
 from sprag_study.worker.ports import StoreError
@@ -179,3 +181,9 @@ def test_people_count_parts_from_1() -> None:
     assert DRIVE.caption("pendulums.0.mass").endswith(", pendulum 1")
     assert DRIVE.caption("clutch.coefficients.1") == "Clutch coefficient of degree 1"
     assert part_name("pendulums.0.clutch") == "Pendulum 1, clutch"
+
+
+@pytest.mark.parametrize("value", [0.005, 0.3 * np.pi / 180.0, 0.0872664625997, 1.0, 0.1234567891])
+def test_an_angle_in_a_column_of_units_can_be_typed_back(value: float) -> None:
+    text, unit = Reading("vibration-drive", Units({"rad": "deg"})).number_and_unit(value, "rad")
+    assert parse_quantity(f"{text} {unit}", "rad") == pytest.approx(value, rel=1e-13)
