@@ -79,6 +79,11 @@ class Checked:
             return gettext("Run at most {n} cases, {time}", n=grouped(count), time=time)
         return ngettext("Run {n} case, {time}", "Run {n} cases, {time}", count, n=grouped(count), time=time)
 
+    def say_beside(self, texts: Mapping[str, str]) -> None:
+        """Add a hint beside each of some fields, by their names."""
+        for name, text in texts.items():
+            self.beside.setdefault(name, []).append(text)
+
     @property
     def query(self) -> str:
         """Parameters of the URL besides the spec."""

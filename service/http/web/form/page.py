@@ -45,7 +45,7 @@ from sprag_study.service.http.web.form.machine import BASE, choices_of, entries,
 from sprag_study.service.http.web.form.machine_spec import base_of, values_of_base
 from sprag_study.service.http.web.form.own_machine import own_spec
 from sprag_study.service.http.web.form.parts import count_of, parts_of, reshape, share, unshared
-from sprag_study.service.http.web.form.sent import changed_kinds, let_vary, settle
+from sprag_study.service.http.web.form.sent import changed_kinds, kept_numbers, let_vary, settle
 from sprag_study.service.http.web.form.sheet import Sheet, sheet_of
 from sprag_study.service.http.web.form.spec import (
     CONDITIONS,
@@ -210,9 +210,9 @@ async def send_form(context: Ctx, work: Attended, request: Request, values: Form
         settle(values, with_ticks=False)
         with_shown_units(values, _reading(values))  # what was typed before is in the shown units too
         return await in_thread(form_page, request, values, await look_over(context, work, values))
-    before, kinds = values, changed_kinds(values)
+    before, kinds, kept = values, changed_kinds(values), dict[str, str]()
     if "/text" not in values:
-        before = unshared(_without_ticks(values | kinds))
+        before, kept = unshared(_without_ticks(values | kinds)), kept_numbers(values)
         _settle(values)
         share(values)
     if wanted == "submit":
@@ -227,6 +227,7 @@ async def send_form(context: Ctx, work: Attended, request: Request, values: Form
     remember(values, before)
     checked = await look_over(context, work, values)
     checked.faults.update(faults)
+    checked.say_beside(kept)
     shown = await live_answer(work, values) if wanted == "live" else None
     answer = None if shown is None else shown["answer"]
     return await in_thread(form_page, request, values, checked, live=answer, opened=opened)
@@ -258,9 +259,12 @@ def _submit(context: Context, request: Request, values: Values, checked: Checked
 @router.post("/new/check")
 async def check(context: Ctx, work: Attended, request: Request, values: Form) -> Response:
     """The live preview: faults and warnings by field, and the panel with cases, time, size and fits."""
+    kept = dict[str, str]()
     if "/text" not in values:
+        kept = kept_numbers(values)
         _settle(values)
     checked = await look_over(context, work, values)
+    checked.say_beside(kept)
 
     def answer() -> dict[str, Any]:
         sheet = None if "/text" in values else _sheet(request, values, checked, _choices(values))

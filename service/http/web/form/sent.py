@@ -14,9 +14,12 @@ from sprag_study.service.http.web.form.machine import BASE, entries, form_of, mo
 from sprag_study.service.http.web.form.parts import count_of, drop, reshape, with_tolerances
 from sprag_study.service.http.web.form.spec import PARTS, is_search
 from sprag_study.service.http.web.form.tolerances import BATCH, own_name
+from sprag_study.service.languages import _
+from sprag_study.service.reading.numbers import parse_number
 from sprag_study.service.reading.quantities import is_si
 from sprag_study.service.reading.together import split_list, with_last_unit
-from sprag_study.service.reading.units import QuantityError, split_quantity
+from sprag_study.service.reading.units import QuantityError, parse_quantity, split_quantity
+from sprag_study.service.reading.wording import number, unit_text
 from sprag_study.service.spec.fields import base_path, base_pointer
 from sprag_study.worker import models
 from sprag_study.worker.models.form import FormChoice, Rows
@@ -28,6 +31,8 @@ VARY: Final = "vary:"
 ALIKE: Final = "alike:"
 ALIKES: Final = "alikes:"
 TICKS: Final = "ticks:"
+#: Of the quantity that a field had when the page was made, by which a changed unit is noticed.
+WAS: Final = "was:"
 #: Of the kind that a choice had when the page was made: other kinds have other meanings of the same fields.
 KIND: Final = "kind:"
 #: Numbers of a row that have the row's unit.
@@ -42,7 +47,7 @@ def settle(values: Values, *, with_ticks: bool = True) -> None:
     without ticks only take them away.
     """
     kinds = changed_kinds(values)
-    for name in [name for name in values if name.startswith(KIND)]:
+    for name in [name for name in values if name.startswith((KIND, WAS))]:
         del values[name]
     if with_ticks and kinds:
         _empty(values, kinds)
@@ -89,6 +94,28 @@ def _part_tolerances(values: Values) -> None:
             values |= {name: parts[0].strip(), field: parts[1].strip(), BATCH: "on"}
             if UNIT + name in values:  # the unit beside the field is that of both numbers
                 values[UNIT + field] = values[UNIT + name]
+
+
+def kept_numbers(values: Mapping[str, str]) -> dict[str, str]:
+    """What is said beside each number that stayed as it was when another unit was chosen for it."""
+    said = {}
+    for entry in entries(values):
+        before, unit = values.get(WAS + entry.name, ""), values.get(UNIT + entry.name, "")
+        text, _blank, old = before.rpartition(" ")
+        value = parse_number(text)
+        if value is None or unit in ("", old) or values.get(entry.name, "").strip() != text:
+            continue
+        try:
+            ratio = parse_quantity(f"1 {old}", entry.field.unit) / parse_quantity(f"1 {unit}", entry.field.unit)
+        except QuantityError:
+            continue
+        said[entry.name] = _(
+            "The number stays: {now} = {before}. The same value is {converted}.",
+            now=f"{number(value)} {unit_text(unit)}",
+            before=f"{number(value / ratio)} {unit_text(old)}",
+            converted=f"{number(value * ratio)} {unit_text(unit)}",
+        )
+    return said
 
 
 def changed_kinds(values: Mapping[str, str]) -> Values:

@@ -114,6 +114,20 @@ def test_a_unit_that_is_typed_counts_more_than_the_one_beside_it() -> None:
     assert spec_of(values)[0]["derive"] == {"pendulums.0.inertia": "2 kg*m^2"}
 
 
+def test_another_unit_keeps_the_number_and_says_so(visitor: Visitor, service: Service) -> None:
+    shown = Controls(service.http.get("/new?preset=one_pendulum").text).values
+    arm = "/base/pendulums/0/arm"
+    sent = {**shown, f"unit:{arm}": "m", "do": "check"}
+    said = "The number stays: 30 m = 30 000 mm. The same value is 0.03 m."
+    assert said in service.http.post("/new", data=sent).text.replace("\u202f", " ").replace("\u00a0", " ")
+    assert "The number stays" not in service.http.post("/new", data={**sent, arm: "0.03"}).text, "both were chosen"
+    page = visitor.page
+    page.goto("/new?preset=one_pendulum")
+    page.locator(f'[name="unit:{arm}"]').select_option("m")
+    expect(page.locator(".hint", has_text="The same value is 0.03 m.")).to_be_visible()
+    assert named(page, arm).input_value() == "30"
+
+
 def test_a_variant_says_what_differs(service: Service) -> None:
     study = service.submit()
     shown = Controls(service.http.get(f"/new?from={study}").text).values
