@@ -441,7 +441,7 @@ def mock() -> Iterator[str]:
         yield address
     finally:
         process.terminate()
-        process.wait(30)
+        process.wait(600)
 
 
 def test_people_log_in_at_a_real_provider(
