@@ -62,10 +62,11 @@ def _show(frame: Any, file: str | None, form: str | None, decimal: Decimal | Non
     heads = {name: heading(name, frame.attrs["units"].get(name, "1")) for name in frame.columns}
     rows = [[_plain(cell) for cell in row] for row in frame.astype(object).itertuples(index=False)]
     if file is not None and form is not None:
-        texts = frame.map(_text).rename(columns=heads)
-        signs = {"sep": ";", "decimal": ","} if decimal == "comma" else {}
-        text = texts.to_csv(index=False, lineterminator="\n", **signs)
-        write_pieces(file, [text.encode("utf-8-sig" if signs else "utf-8")])
+        from sprag_study.service.exports.decimal_commas import with_decimals
+        from sprag_study.service.exports.text import table_csv
+
+        table = table_csv(heads.values(), [map(_text, frame[name]) for name in frame.columns])
+        write_pieces(file, with_decimals([table], decimal))
         say_file(file, form)
     if wants_json():
         columns = [{"name": name, "unit": frame.attrs["units"].get(name)} for name in frame.columns]

@@ -9,6 +9,7 @@ import re
 from contextlib import closing
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag_study.service.client.arrow_tables import require_columns, with_plain_numbers
 from sprag_study.service.client.errors import ArgumentError, StatementError
 from sprag_study.service.client.frames import arrow_of, units_of
 from sprag_study.service.client.tabular import from_arrow
@@ -36,8 +37,9 @@ _LOCKED: Final = "SET enable_external_access = false; SET lock_configuration = t
 
 def table_names(names: Collection[str]) -> None:
     """Refuse names of studies that cannot be those of tables side by side; ArgumentError."""
-    if len({*map(str.casefold, names), CASES}) <= len(names) or not names:
-        raise ArgumentError("studies", ", ".join(names), 'one study or more, of different names, none of them "cases"')
+    if len({*map(str.casefold, names), CASES, ""}) <= len(names) + 1 or not names:
+        allowed = 'one study or more, of different names, none of them empty or "cases"'
+        raise ArgumentError("studies", ", ".join(names), allowed)
 
 
 def read_only(statement: str) -> duckdb.Statement:
@@ -49,9 +51,27 @@ def read_only(statement: str) -> duckdb.Statement:
         parts = duckdb.extract_statements(statement)
     except duckdb.Error as error:
         raise StatementError(str(error)) from error
-    if len(parts) != 1 or parts[0].type != duckdb.StatementType.SELECT:
-        raise StatementError("sql takes one statement, which only reads: SELECT, FROM, WITH, DESCRIBE or SUMMARIZE")
+    if len(parts) != 1 or not _reads(parts[0]):
+        raise StatementError(
+            "sql takes one statement, which only reads: SELECT, FROM, WITH, PIVOT, DESCRIBE or SUMMARIZE"
+        )
     return parts[0]
+
+
+def _reads(part: duckdb.Statement) -> bool:
+    """Whether a statement only reads.
+
+    A PIVOT that looks for its columns itself is several statements to DuckDB, whatever is done with its rows; only one
+    that reads can stand in brackets behind FROM.
+    """
+    import duckdb
+
+    if part.type != duckdb.StatementType.MULTI:
+        return part.type == duckdb.StatementType.SELECT
+    try:
+        return len(duckdb.extract_statements(f"FROM ({part.query.rstrip().rstrip(';')}\n)")) == 1
+    except duckdb.Error:
+        return False
 
 
 def selected(statement: str, rows: Mapping[str, bytes], polars: bool) -> pd.DataFrame | pl.DataFrame:
@@ -65,12 +85,14 @@ def selected(statement: str, rows: Mapping[str, bytes], polars: bool) -> pd.Data
         The rows of each study as a Parquet file, by the name of its table.
     polars : bool
         Whether the answer is a polars table; otherwise it is a pandas table, and ``attrs["units"]`` has the unit of
-        each column that has the name of one of the studies'.
+        each column that has the name of one of the studies'. Whole numbers are int64 and decimals float64. Where
+        several columns have one name, DuckDB numbers the others: "a", "a_1".
 
     Raises
     ------
     StatementError
-        For what is no single SELECT, and for one that DuckDB refuses.
+        For what is no single SELECT, for one that DuckDB refuses or has no memory for, and for columns that a table
+        cannot have.
     """
     chosen = read_only(statement)
     with naming_extra("sql", "frames"):
@@ -80,20 +102,31 @@ def selected(statement: str, rows: Mapping[str, bytes], polars: bool) -> pd.Data
     tables = {name: arrow_of(parquet).read() for name, parquet in rows.items()}
     units = _common_units([units_of(table.schema) for table in tables.values()])
     with closing(duckdb.connect(config=_CLOSED)) as connection:
-        for name, table in tables.items():
-            connection.register(name, table)
-        if CASES not in tables:
-            connection.execute(f"CREATE VIEW {CASES} AS {_union(list(tables))}")
-        connection.execute(_LOCKED)
         try:
-            answer: Any = connection.sql(chosen).to_arrow_table()
+            for name, table in tables.items():
+                connection.register(name, table)
+            if CASES not in tables:
+                connection.execute(f"CREATE VIEW {CASES} AS {_union(list(tables))}")
+            connection.execute(_LOCKED)
+            relation = connection.sql(chosen)
+            names = relation.columns
+            if len({*names}) < len(names):
+                relation = relation.project("*")  # a subquery, whose columns DuckDB numbers
+            answer: Any = relation.to_arrow_table()
+        except duckdb.OutOfMemoryException as error:
+            # The ways out that DuckDB names are settings, which are locked.
+            reason = str(error).partition("\n")[0]
+            raise StatementError(f"{reason}\nSelect fewer columns or cases, or group them") from error
         except duckdb.Error as error:
             columns = {column for table in tables.values() for column in table.column_names}
             raise StatementError(f"{error}{_hint(statement, columns)}") from error
+    require_columns(answer, polars)
+    answer = with_plain_numbers(answer)
     if polars:
         return from_arrow(answer)
     frame: pd.DataFrame = answer.to_pandas()
-    frame.attrs["units"] = {name: units[name] for name in frame.columns if name in units}
+    shown = zip(frame.columns, names, strict=True)
+    frame.attrs["units"] = {column: units[name] for column, name in shown if name in units}
     return frame
 
 

@@ -120,7 +120,7 @@ class AsyncStudyTables(AsyncStudyPart):
         Raises
         ------
         StatementError
-            For a statement that does not only read, or that DuckDB refuses.
+            For a statement that does not only read, that DuckDB refuses, or whose columns a table cannot have.
         """
         read_only(statement)  # before any row is asked for
         return selected(statement, {CASES: await self._parquet(units)}, polars)

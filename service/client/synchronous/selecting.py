@@ -60,10 +60,10 @@ def sql(
     Raises
     ------
     StatementError
-        For a statement that does not only read, or that DuckDB refuses.
+        For a statement that does not only read, that DuckDB refuses, or whose columns a table cannot have.
     ArgumentError
-        Where two names are equal, also but for capitals, or one is "cases", and where studies have a column in
-        different units.
+        Where two names are equal, also but for capitals, or one is empty or "cases", and where studies have a column
+        in different units.
     """
     if isinstance(studies, Mapping):
         named = dict(studies)

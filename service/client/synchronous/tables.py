@@ -116,7 +116,7 @@ class StudyTables(StudyPart):
         Raises
         ------
         StatementError
-            For a statement that does not only read, or that DuckDB refuses.
+            For a statement that does not only read, that DuckDB refuses, or whose columns a table cannot have.
         """
         read_only(statement)  # before any row is asked for
         return selected(statement, {CASES: self._parquet(units)}, polars)

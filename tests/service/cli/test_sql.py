@@ -56,6 +56,33 @@ def test_rows_of_a_study_by_sql(sprag: Callable[..., Finished], sources: tuple[s
     assert sprag("show", sources[1], "sql", STATEMENT, "--decimal", "comma").code == 2
 
 
+def test_a_file_has_the_numbers_and_texts_of_every_csv_file(
+    sprag: Callable[..., Finished], sources: tuple[str, str], tmp_path: Path
+) -> None:
+    """Decimal commas in every number, and quotes around a text that looks like one."""
+    file = tmp_path / "rows.csv"
+    statement = (
+        "select 1.5, 12.118::decimal(8, 3) as d, '65.00' as t, '12,1175' as c, true as b, flags from cases limit 1"
+    )
+    for option, line in (
+        ((), '1.5,12.118,"65.00","12,1175",True,""'),
+        (("--decimal", "comma"), '1,5;12,118;"65.00";"12,1175";True;""'),
+    ):
+        done = sprag("show", sources[1], "sql", statement, "-o", file, *option)
+        assert done.code == 0, done.err
+        assert file.read_text(encoding="utf-8-sig").splitlines()[1] == line
+
+
+def test_sums_are_numbers_and_columns_of_one_name_are_shown(
+    sprag: Callable[..., Finished], sources: tuple[str, str]
+) -> None:
+    done = sprag("show", sources[1], "sql", 'select sum("case") as n, 0.5 as n from cases', "--json")
+    assert json.loads(done.out) == {
+        "columns": [{"name": "n", "unit": None}, {"name": "n_1", "unit": None}],
+        "rows": [[1, 0.5]],
+    }
+
+
 def test_a_wrong_statement_is_wrong_input(sprag: Callable[..., Finished], sources: tuple[str, str]) -> None:
     for statement, said in (("select shaft.load from cases", "double quotes"), ("drop view cases", "only reads")):
         done = sprag("show", sources[1], "sql", statement)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import sys
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import polars as pl
 import pytest
 
 import sprag_study as sprag
-from sprag_study.service.client import Client, Study
+from sprag_study.service.client import Client, Study, statements
 from sprag_study.service.client.statements import CASES, selected
 from tests.service.conftest import Service
 
@@ -57,7 +58,7 @@ def test_several_studies_are_tables_with_their_names(pair: tuple[Study, Study], 
     assert len(client.sql("from before", {"before": there.id}, polars=True)) == 9
 
 
-@pytest.mark.parametrize("names", [[], ["a", "A"], ["Cases"]])
+@pytest.mark.parametrize("names", [[], ["a", "A"], ["Cases"], [""], ["a", ""]])
 def test_names_of_tables_are_different(pair: tuple[Study, Study], names: list[str]) -> None:
     with pytest.raises(sprag.SpragError, match="of different names") as refused:
         sprag.sql("from cases", dict.fromkeys(names, pair[0]))
@@ -90,6 +91,9 @@ BEYOND = (
     "drop view cases",
     "create table more as from cases",
     "select 1; select 2",
+    "create table more as pivot cases on a using count(*)",
+    "with p as (pivot cases on a using count(*)) delete from cases returning *",
+    "copy (pivot cases on a using count(*)) to '{file}'",
     "pragma database_list",
     "",
     "selec 1",
@@ -107,6 +111,60 @@ def test_a_statement_only_reads_the_rows(tmp_path: Path, statement: str) -> None
     with pytest.raises(sprag.StatementError):
         selected(statement.format(file=file, there=there, folder=tmp_path), rows, False)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["rows.parquet", "there.csv"]
+
+
+@pytest.fixture
+def rows() -> dict[str, bytes]:
+    """Three cases as `selected` takes them."""
+    file = io.BytesIO()
+    pd.DataFrame({"case": [0, 1, 2], "a": [1.0, 2.0, 4.0], "kind": ["u", "v", "u"]}).to_parquet(file)
+    return {CASES: file.getvalue()}
+
+
+def test_sums_and_decimals_are_numbers(rows: dict[str, bytes]) -> None:
+    statement = 'select sum("case") as n, 1.5 as d, 1e3::decimal(9, 2) as e, sum(2 ** 63::hugeint) as h from cases'
+    frame = selected(statement, rows, False)
+    assert [kind.kind for kind in frame.dtypes] == ["i", "f", "f", "f"]
+    assert frame.iloc[0].tolist() == [3, 1.5, 1000.0, 3 * 2.0**63]
+    nested = "select [1.5, 2] as items, {'a': 0.1} as parts, [sum(\"case\")] as whole from cases"
+    assert selected(nested, rows, True).to_dicts() == [{"items": [1.5, 2.0], "parts": {"a": 0.1}, "whole": [3]}]
+
+
+@pytest.mark.parametrize("polars", [False, True])
+def test_columns_of_one_name_are_numbered(pair: tuple[Study, Study], polars: bool) -> None:
+    statement = f'select "{LOAD}", "{LOAD}", a."{SPEED}" from cases a order by "case"'
+    table: Any = pair[1].sql(statement, polars=polars)
+    assert list(table.columns) == [LOAD, f"{LOAD}_1", SPEED]
+    if not polars:
+        assert table.attrs["units"] == {LOAD: "N*m", f"{LOAD}_1": "N*m", SPEED: "rad/s"}
+
+
+def test_a_pivot_only_reads(rows: dict[str, bytes]) -> None:
+    for statement in (
+        "pivot cases on kind using sum(a);",
+        "from (pivot cases on kind using sum(a)) -- both",
+    ):
+        assert {"u", "v"} <= set(selected(statement, rows, False).columns)
+
+
+@pytest.mark.parametrize(
+    ("statement", "polars"),
+    [
+        ("select union_value(a := 1) as u", False),
+        ("select [union_value(a := 1)] as u", True),
+        ("select interval 1 day as u", True),
+    ],
+)
+def test_types_that_tables_do_not_have_are_refused(rows: dict[str, bytes], statement: str, polars: bool) -> None:
+    with pytest.raises(sprag.StatementError, match='the column "u" has the type'):
+        selected(statement, rows, polars)
+
+
+def test_no_setting_is_named_where_memory_is_short(rows: dict[str, bytes], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(statements._CLOSED, "memory_limit", "10MB")
+    with pytest.raises(sprag.StatementError, match="fewer columns or cases") as refused:
+        selected("from range(10_000_000) t(a) order by random()", rows, False)
+    assert "SET " not in str(refused.value)
 
 
 def test_nothing_is_asked_for_before_the_statement_is_read(pair: tuple[Study, Study]) -> None:
