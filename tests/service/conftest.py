@@ -126,7 +126,12 @@ def made_up(study: Study) -> ChunkResult:
     """Results of every case, random doubles of many sizes; every fifth case failed, every fourth has a flag."""
     infos = models.study_results(study)
     random = np.random.default_rng(7)
-    values = random.normal(size=(study.cases, len(infos))) * 10.0 ** random.integers(-12, 12, (study.cases, len(infos)))
+    values = np.empty((study.cases, len(infos)))
+    # Results that are added later leave the numbers of the others as they are.
+    for generation in sorted({info.generation for info in infos}):
+        some = [column for column, info in enumerate(infos) if info.generation == generation]
+        size = study.cases, len(some)
+        values[:, some] = random.normal(size=size) * 10.0 ** random.integers(-12, 12, size)
     for column, info in enumerate(infos):
         if info.kind == "count":
             values[:, column] = np.arange(study.cases) + column
