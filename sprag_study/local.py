@@ -14,6 +14,8 @@ from sprag_study.service.jobs.local import opened, pool_size, run_folder, run_st
 from sprag_study.service.plain_data import plain
 from sprag_study.service.settings import Settings
 from sprag_study.service.spec.document import SpecError, parse_spec
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.studies.copying import copy_study
 from sprag_study.worker.chunking import Chunking
 from sprag_study.worker.ports import StoreError
 
@@ -37,7 +39,8 @@ class LocalStudy(Study):
 
     It is its own table, too: ``study["efficiency"]``, ``len(study)``, ``study.attrs["units"]``, ``study.head()`` and
     whatever else a pandas table has and a study has not are those of one table, which is read once; `table` gives a new
-    one. Without a database of its own it lasts as long as this object, or until `close`; a pickle of it has its rows.
+    one. Without a database of its own it lasts as long as this object, or until `close`; a pickle or a copy of it has
+    its rows, and no other study of its database.
     """
 
     _client: _Local
@@ -60,7 +63,7 @@ class LocalStudy(Study):
         self.close()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _restored, (self._client.content(), self.id)
+        return _restored, (self._client.content(self.id), self.id)
 
     @property
     def attrs(self) -> dict[Any, Any]:
@@ -141,12 +144,14 @@ class _Local(Here):
             store, record, processes=size, chunk_timeout=timeout, kept=self._kept, on_progress=on_progress
         )
 
-    def content(self) -> bytes:
-        """A copy of the database."""
+    def content(self, study_id: str) -> bytes:
+        """The file of a database that has that study and nothing else; StoreError."""
+        self.require_open()
         with run_folder() as folder:
-            copy = folder / "copy.sqlite3"
-            self.library.store.backup(copy)
-            return copy.read_bytes()
+            file = folder / "copy.sqlite3"
+            with Store.open(f"sqlite:///{file}") as copy:
+                copy_study(self.library.store.session, copy.session, study_id)
+            return file.read_bytes()
 
 
 def _restored(content: bytes, study_id: str) -> LocalStudy:

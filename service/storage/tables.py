@@ -181,6 +181,9 @@ STAGES = sa.Table(
     sqlite_with_rowid=False,
 )
 
+#: Tables with a few rows of each study, besides its saved views.
+OF_STUDIES: Final = (ENDINGS, ROUNDS, STAGES)
+
 IDEMPOTENCY_KEYS = sa.Table(
     "idempotency_keys",
     METADATA,
@@ -284,6 +287,12 @@ def _table_of_rows(
             *indexes,
             sqlite_with_rowid=False,
         )
+
+
+def tables_of_rows(model: str, variant: str) -> list[sa.Table]:
+    """The tables with the rows of a study of that variant of ``model``, a row for each case or more."""
+    further = further_table(model, variant)
+    return [results_table(model, variant), *([] if further is None else [further])]
 
 
 def all_tables() -> sa.MetaData:

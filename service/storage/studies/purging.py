@@ -16,13 +16,10 @@ from sprag_study.service.storage.tables import (
     CASE_KEYS,
     CHUNKS,
     ENDED,
-    ENDINGS,
     HELD_AT_DEADLINE,
-    ROUNDS,
-    STAGES,
+    OF_STUDIES,
     STUDIES,
-    further_table,
-    results_table,
+    tables_of_rows,
 )
 from sprag_study.worker.case_keys import case_keys
 from sprag_study.worker.study import Study
@@ -78,10 +75,8 @@ class Purging(Part):
             if connection.execute(sa.select(c.number).where(over).limit(1)).first() is None:
                 return
         for number, model, variant in self._taken_away(over):
-            rows = results_table(model, variant)
-            yield from _emptied(partial(self._delete_first, rows, rows.c.case_number, number))
-            if (further := further_table(model, variant)) is not None:
-                yield from _emptied(partial(self._delete_first, further, further.c.case_number, number))
+            for rows in tables_of_rows(model, variant):
+                yield from _emptied(partial(self._delete_first, rows, rows.c.case_number, number))
             yield from _emptied(partial(self._delete_first, CHUNKS, CHUNKS.c["first"], number))
             if keys := self._keys(number):
                 yield from _emptied(partial(self._delete_keys, keys, number))
@@ -120,7 +115,7 @@ class Purging(Part):
     def _remove(self, number: int) -> None:
         """Delete a study that has no rows any more."""
         with self.session.write() as connection:
-            for table in (ENDINGS, ROUNDS, STAGES, SAVED_VIEWS):
+            for table in (*OF_STUDIES, SAVED_VIEWS):
                 connection.execute(sa.delete(table).where(table.c.study == number))
             connection.execute(sa.delete(STUDIES).where(STUDIES.c.number == number))
 

@@ -18,16 +18,22 @@ from typing import Any
 
 import httpx
 import pytest
+import sqlalchemy as sa
 import typer
 
 import sprag_study as sprag
 from sprag_study.service import login
+from sprag_study.service.actor import Role
 from sprag_study.service.client import AmbiguousError, AsyncClient, AsyncStudy, Client, Study, UntrustedError
 from sprag_study.service.client.errors import ArgumentError
 from sprag_study.service.client.wire import COMPUTED, TIMEOUT
 from sprag_study.service.faults import Fault
 from sprag_study.service.jobs.local import StudyHeldError
+from sprag_study.service.spec.saved_views import View
 from sprag_study.service.storage.errors import StudyNotFoundError
+from sprag_study.service.storage.people.scopes import TokenScope
+from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.tables import STUDIES, all_tables
 from tests.service.timed_spec import SPEC
 
 LOAD, SPEED = "shaft.load", "shaft.speed.mean"
@@ -136,6 +142,49 @@ def test_a_study_goes_to_another_process_with_its_rows(run: sprag.Study) -> None
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
         speed, process = pool.submit(fastest, run).result()
     assert (speed, process != os.getpid()) == (fastest(run)[0], True)
+
+
+def test_a_pickle_has_one_study_and_nobody(tmp_path: Path) -> None:
+    """Whoever gets the pickle of one study gets no other one of its database, and no key of its service."""
+    database = str(tmp_path / "office.sqlite3")
+    other = sprag.run({**SMALL, "name": "of the competitor"}, database=database, processes=0)
+    study = sprag.run({**SMALL, "axes": [{"path": LOAD, "values": ["0.1 N*m", "0.2 N*m"]}]}, database=database)
+    with Store.open(f"sqlite:///{database}") as store:
+        secret = store.people.create_session_key()
+        store.people.add_user("anna", Role.DESIGNER)
+        token, _ = store.people.create_token("laptop", TokenScope.WRITE, owner="anna")
+        store.views.save(View("curves", "the best", study=study.id, in_report=True))
+        with store.session.write() as connection:
+            connection.execute(sa.update(STUDIES).values(owner="anna"))
+    content, report = pickle.dumps(study), study.download("html")
+    for hidden in (b"anna", b"competitor", other.id.encode(), token.encode(), secret.hex().encode()):
+        assert hidden not in content
+    for opened in (again(study), copy.copy(study), copy.deepcopy(study)):
+        with opened:
+            store = opened._client.library.store
+            with store.session.read() as reading:
+                full = {
+                    table.name
+                    for table in all_tables().sorted_tables
+                    if reading.execute(sa.select(sa.literal(1)).select_from(table).limit(1)).first()
+                }
+            assert full - {"deployment"} == {
+                "studies", "chunks", "endings", "stages", "fingerprints", "saved_views", "vibration_drive_1",
+            }  # fmt: skip
+            assert opened.table().equals(study.table())
+            assert opened.detail() == {**study.detail(), "owner": None}
+            assert opened.download("html") == report
+            assert store.check().problems == ()
+            further = opened.extend([{"path": LOAD, "values": ["0.1 N*m", "0.3 N*m"]}]).detail()
+            assert (further["progress"]["ok"], further["reused"]) == (3, 2)
+
+
+def test_a_closed_study_says_so() -> None:
+    study = sprag.run(SMALL, processes=0)
+    study.close()
+    for ask in (pickle.dumps, copy.copy, copy.deepcopy, sprag.Study.detail, lambda closed: closed.sql("from cases")):
+        with pytest.raises(sprag.StoreError, match="the study is closed"):
+            ask(study)
 
 
 def test_the_folder_of_a_pickle_is_swept_after_a_kill(run: sprag.Study, tmp_path: Path) -> None:
