@@ -7,9 +7,11 @@ import os
 from contextlib import suppress
 from pathlib import Path
 from typing import Final
+from urllib.parse import urlsplit
 
 #: Default address of `sprag serve`.
 DEFAULT_SERVER: Final = "http://127.0.0.1:8000"
+_PORTS: Final = {"http": 80, "https": 443}
 
 
 def service_of(server: str | None, token: str | None) -> tuple[str, str | None]:
@@ -17,21 +19,32 @@ def service_of(server: str | None, token: str | None) -> tuple[str, str | None]:
 
     What is given comes first, then ``SPRAG_SERVER`` and ``SPRAG_TOKEN``, then the login. A token that is kept is for
     the service of the same login only: it is sent to no other. ``SPRAG_TOKEN``, which may be the secret of a service
-    of this machine, is not sent to the service of a login.
+    of this machine, is not sent to the service of a login, however its address is given, unless ``SPRAG_SERVER``
+    names it, too.
 
     Parameters
     ----------
     server, token : str or None
         None where it is not given; a token of "" is none.
     """
-    named, kept = os.environ.get("SPRAG_SERVER") if server is None else server, profile()
-    if server is None and not named and "server" in kept:
-        return kept["server"], kept.get("token", "") if token is None else token
-    chosen = (named or DEFAULT_SERVER) if server is None else server
+    named, kept = os.environ.get("SPRAG_SERVER", ""), profile()
+    chosen = (named or kept.get("server") or DEFAULT_SERVER) if server is None else server
     if token is not None:
         return chosen, token
-    of_login = chosen.rstrip("/") == kept.get("server", "").rstrip("/")
-    return chosen, os.environ.get("SPRAG_TOKEN") or (kept.get("token") if of_login else None)
+    of_login = _place(chosen) == _place(kept.get("server", ""))
+    of_environment = not of_login or _place(chosen) == _place(named)
+    secret = os.environ.get("SPRAG_TOKEN") if of_environment else None
+    return chosen, secret or (kept.get("token", "") if of_login else None)
+
+
+def _place(address: str) -> tuple[object, ...]:
+    """What tells the address of one service from another's: without user, the usual port, and a slash at the end."""
+    parts = urlsplit(address)
+    try:
+        port = parts.port or _PORTS.get(parts.scheme)
+    except ValueError:
+        return (address,)
+    return parts.scheme, parts.hostname, port, parts.path.rstrip("/")
 
 
 def profile_file() -> Path:

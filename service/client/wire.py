@@ -54,9 +54,9 @@ def connection_options(server: str, token: str | None) -> dict[str, Any]:
     try:
         url = httpx.URL(server)
     except httpx.InvalidURL as error:
-        raise ValueError(f"{server!r} is not an address: {error}") from error
+        raise ValueError(f"{public(server)!r} is not an address: {error}") from error
     if url.scheme not in ("http", "https") or not url.host:
-        raise ValueError(f"{server!r} is not the address of a service, such as http://127.0.0.1:8000")
+        raise ValueError(f"{public(server)!r} is not the address of a service, such as http://127.0.0.1:8000")
     secret = (token or "").strip()
     if secret and not _TOKEN.fullmatch(secret):  # the secret itself is in no message
         raise ValueError(N_("the token is not valid: it has only letters, digits and -._~+/ and may end with ="))
@@ -64,6 +64,11 @@ def connection_options(server: str, token: str | None) -> dict[str, Any]:
     # A proxy from the environment is never used for this machine itself.
     found = {"base_url": server, "headers": headers, "timeout": TIMEOUT, "trust_env": not is_loopback(url.host)}
     return found | ({"verify": _trusted()} if url.scheme == "https" else {})
+
+
+def public(server: str) -> str:
+    """The address of a service without user and password, for messages and pickles."""
+    return re.sub(r"(?<=://)[^/?#]*@", "", server).rstrip("/")
 
 
 def _trusted() -> ssl.SSLContext:

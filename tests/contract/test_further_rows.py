@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import sqlalchemy as sa
 
 from sprag_study.service.storage.rows.columns import records
 from sprag_study.service.storage.store import Store
+from sprag_study.service.storage.studies.copying import copy_study
 from sprag_study.service.storage.tables import further_table
 from sprag_study.worker import models
 from sprag_study.worker.models import ChunkResult, FurtherRows
@@ -74,6 +76,17 @@ def test_rows_of_a_case_come_back_in_order(store: Store) -> None:
     assert _speeds(store.rows.of_case(study_id, 2)) == [(2, 2.0), (2, 12.0), (2, 22.0)]
     assert [row.flags for row in store.rows.of_case(study_id, 0)] == [(), ("irregular",)]
     assert _speeds(store.rows.page(study_id).rows()) == [(case, float(case)) for case in range(4)]
+
+
+def test_a_study_is_copied_into_another_database(store: Store, tmp_path: Path) -> None:
+    _filled(store, _result())
+    study_id, _ = _filled(store, _result((2, 1), (2, 2), (0, 1)))
+    with Store.open(f"sqlite:///{tmp_path / 'copy.sqlite3'}") as copy:
+        copy_study(store.session, copy.session, study_id)
+        assert _speeds(copy.rows.block(study_id).rows()) == _speeds(store.rows.block(study_id).rows())
+        assert copy.studies.get(study_id) == store.studies.get(study_id)
+        assert _count(copy) == 3
+        assert copy.check().problems == store.check().problems
 
 
 def test_a_number_chooses_among_the_rows_of_each_case(store: Store) -> None:

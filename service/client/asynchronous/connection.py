@@ -25,6 +25,7 @@ from sprag_study.service.client.wire import (
     limited,
     patience,
     plain_body,
+    public,
     refusal,
     study_path,
     unanswered,
@@ -53,8 +54,9 @@ class AsyncConnection:
     Every method may raise `UnreachableError` when no service answers, and `RefusedError`, whose ``errors`` list each
     fault with its field, value and allowed range. ValueError for a server that is not an HTTP address.
 
-    A pickle has the address, but no token: whoever opens it has the token of ``SPRAG_TOKEN`` or of the login there. A
-    client with a ``transport`` cannot be pickled. A copy is the client itself.
+    A pickle has the address, but neither a token nor the user and password of an address: whoever opens it has the
+    token of ``SPRAG_TOKEN`` or of the login there. A client with a ``transport`` cannot be pickled. A copy is the
+    client itself.
     """
 
     def __init__(
@@ -67,8 +69,8 @@ class AsyncConnection:
         transport: httpx.AsyncBaseTransport | None = None,
     ) -> None:
         chosen, secret = service_of(server, token)
-        self.server = chosen.rstrip("/")
-        self._http = httpx.AsyncClient(transport=transport, **connection_options(self.server, secret))
+        self._http = httpx.AsyncClient(transport=transport, **connection_options(chosen.rstrip("/"), secret))
+        self.server = public(chosen)
         self.retry, self._timeout, self._open_to_all = retry, timeout, token == ""
         self._replaced = transport is not None
         self._answered = False

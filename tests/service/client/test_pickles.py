@@ -241,6 +241,37 @@ def test_a_client_asks_the_service_of_the_login(
     assert (Client().server, Client()._http.headers.get("authorization")) == ("http://near.example", None)
 
 
+def test_the_token_of_the_environment_does_not_go_to_the_service_of_the_login(
+    kept: Callable[[dict[str, str]], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept({"server": "https://office.example", "token": "of-the-login"})
+    monkeypatch.setenv("SPRAG_TOKEN", "of-this-machine")
+    addresses = ("https://office.example/", "https://OFFICE.example:443")
+    for client in (Client(), again(Client()), *map(Client, addresses), *map(AsyncClient, addresses)):
+        assert client._http.headers["authorization"] == "Bearer of-the-login"
+    assert Client("http://office.example")._http.headers["authorization"] == "Bearer of-this-machine"
+    kept({"server": "https://office.example"})
+    assert "authorization" not in again(Client())._http.headers
+    monkeypatch.setenv("SPRAG_SERVER", "https://office.example")
+    assert again(Client())._http.headers["authorization"] == "Bearer of-this-machine"
+
+
+@pytest.mark.parametrize("kind", [Client, AsyncClient])
+def test_a_password_in_the_address_is_left_behind(kind: Any) -> None:
+    client = kind("https://anna:very-secret@sprag.example:8443/office/")
+    assert client.server == "https://sprag.example:8443/office"
+    assert client._http.base_url.password == "very-secret"
+    content = pickle.dumps(client)
+    assert b"very-secret" not in content
+    assert b"anna" not in content
+    assert pickle.loads(content).server == client.server
+    with pytest.raises(ValueError, match="is not") as refused:
+        kind("ftp://anna:very-secret@sprag.example")
+    assert "very-secret" not in str(refused.value)
+    bare = kind("http://sprag.example/a@b")
+    assert bare.server == "http://sprag.example/a@b"
+
+
 def test_answers_that_are_computed_are_waited_for_longer() -> None:
     waited: dict[str, float] = {}
 
