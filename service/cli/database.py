@@ -22,6 +22,7 @@ from sprag_study.service.faults import FaultError
 from sprag_study.service.languages import _
 
 if TYPE_CHECKING:
+    from sprag_study.service.exports.audit import AuditFormat
     from sprag_study.service.storage.database.session import Session
 
 
@@ -187,9 +188,12 @@ def audit(
     target: Annotated[
         str | None, typer.Option("--target", metavar="ID", help="Only changes of this study, schedule, token or user.")
     ] = None,
-    form: Annotated[AuditForm, typer.Option("--format", help="One row or one JSON object for each change.")] = (
-        AuditForm.CSV
-    ),
+    form: Annotated[
+        AuditForm | None,
+        typer.Option(
+            "--format", help="A CSV row or a JSON object for each change; default: csv, with --json a document."
+        ),
+    ] = None,
     output: OutputFile = None,
     db: Database = None,
 ) -> None:
@@ -203,7 +207,8 @@ def audit(
         named = [replace(fault, where=f"--{fault.where}") for fault in error.faults]
         raise WrongInputError("invalid-parameter", _("invalid option"), named) from error
     with named_store(db) as store:
-        write_pieces(output, audit_pieces(store.audit.rows(wanted), form.value))
+        usual: AuditFormat = "json" if wants_json() else "csv"
+        write_pieces(output, audit_pieces(store.audit.rows(wanted), form.value if form else usual))
 
 
 def _tell_damaged(problems: Sequence[str]) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
+from dataclasses import replace
 from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -71,6 +72,9 @@ class Limit(StrEnum):
     STORAGE = "storage"
     CHECKS = "checks"
 
+
+#: Options whose parameter of the same name can be at fault.
+_OPTIONS: Final = frozenset({*Limit, "to"})
 
 AsSet = Annotated[
     list[Limit] | None,
@@ -206,7 +210,8 @@ def users_of(db: str | None) -> Iterator[Store]:
         except UserExistsError as error:
             raise WrongInputError("user-exists", str(error)) from error
         except FaultError as error:
-            raise WrongInputError("invalid-parameter", error.detail, error.faults) from error
+            named = [replace(it, where=f"--{it.where}") if it.where in _OPTIONS else it for it in error.faults]
+            raise WrongInputError("invalid-parameter", error.detail, named) from error
 
 
 def _quota(cases: int | None, storage: int | None, checks: int | None) -> Quota:

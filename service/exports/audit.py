@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from sprag_study.service.storage.people.audit import AuditRecord
 
 AuditFormat = Literal["json", "csv", "jsonl"]
-#: Formats of the log; `json` is a page of it.
+#: Formats of the log; `json` is a page of it, of the command all of it.
 AUDIT_FORMATS: Final[dict[AuditFormat, str]] = {
     "json": "application/json",
     "csv": "text/csv; charset=utf-8",
@@ -32,8 +32,14 @@ def entry_json(record: AuditRecord) -> AuditEntry:
 
 
 def audit_pieces(records: Iterable[AuditRecord], form: AuditFormat) -> Iterator[bytes]:
-    """The rows as CSV, with a header, or as one JSON object per line."""
+    """The rows as CSV, with a header, as one JSON object per line, or as one document with all of them."""
     rest = map(entry_json, records)
+    if form == "json":
+        yield b'{"entries": ['
+        for number, entry in enumerate(rest):
+            yield (b",\n" if number else b"\n") + to_bytes(entry)
+        yield b"\n]}\n"
+        return
     if form == "csv":
         yield typed_lines([list(AuditEntry.__annotations__)])
     while piece := list(islice(rest, _PIECE)):

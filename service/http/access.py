@@ -3,7 +3,8 @@
 A request carries its token as ``Authorization: Bearer``. A browser logs in once with a token, or at an OpenID provider
 (`sprag_study.service.http.oidc`), and gets a cookie that contains the token's id or the user, and the expiry, signed
 with a key of the database. The cookie is valid on all hosts of that database and across restarts, until the token is
-revoked or the user removed, the browser logs out, or `SESSION_SECONDS` have passed.
+revoked or the user removed, the browser logs out, or `SESSION_SECONDS` have passed. A user's salt is signed too, and
+another one ends the sessions of the user.
 """
 
 from __future__ import annotations
@@ -76,6 +77,8 @@ class Access:
         self._by_digest: dict[str, TokenRecord] = {}
         self._by_id: dict[str, TokenRecord] = {}
         self._users: dict[str, UserRecord] = {}
+        #: What is signed with the sessions of users, by the beginning of their identity.
+        self._salts: dict[str, str] = {}
         self._uses: dict[str, int] = {}
         self._any = False
         self._read_at: float | None = None
@@ -108,6 +111,7 @@ class Access:
             seal: end for seal, end in (*self._logged_out.items(), *found.ended.items()) if end > now_seconds
         }
         self._users = {user.name: user for user in users}
+        self._salts = {_session_of_user(user.name): user.session_salt for user in users}
         self._by_digest = {record.digest: record for record in records}
         self._by_id = {record.id: record for record in records}
         self._any, self._read_at = bool(records or users), now
@@ -231,7 +235,7 @@ class Access:
     async def log_in(self, grant: Grant) -> str:
         """The value of the session cookie for ``grant``; raises StoreError."""
         await self.require_key()
-        who = f"{_USER}{_encoded(grant.user)}" if grant.user is not None and grant.token is None else grant.id
+        who = _session_of_user(grant.user) if grant.user is not None and grant.token is None else grant.id
         identity = f"{who}.{int(time.time()) + SESSION_SECONDS}"
         return f"{identity}.{self._sealed(identity)}"
 
@@ -260,8 +264,9 @@ class Access:
         if identity.startswith(f"{_SETTING}.") and self._setting is not None:
             # A session does not outlive its token: another value of the setting gives another signature.
             message += digest_of(self._setting).encode("ascii")
-        if identity.startswith(_USER):  # nor its provider
+        if identity.startswith(_USER):  # nor its provider, nor the account there, nor its role
             message += digest_of((self._oidc or secrets.token_hex()).encode()).encode("ascii")
+            message += self._salts.get(identity.partition(".")[0], "").encode("ascii")
         return hmac.new(self._key or secrets.token_bytes(32), message, hashlib.sha256).hexdigest()
 
 
@@ -269,8 +274,9 @@ def _of_user(name: str, role: Role, record: UserRecord | None) -> Grant:
     return Grant(f"user {name}", name, role, None, name, None if record is None else record.quota.checks)
 
 
-def _encoded(name: str) -> str:
-    return urlsafe_b64encode(name.encode()).decode("ascii").rstrip("=")
+def _session_of_user(name: str) -> str:
+    """The beginning of the identity of a user's session."""
+    return f"{_USER}{urlsafe_b64encode(name.encode()).decode('ascii').rstrip('=')}"
 
 
 def _decoded(text: str) -> str:

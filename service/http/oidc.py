@@ -23,20 +23,28 @@ from sprag_study.service.extras import naming_extra
 from sprag_study.service.faults import FaultError
 from sprag_study.service.http.problems import ApiError
 from sprag_study.service.oidc import is_safe_address
+from sprag_study.service.storage.people.accounts import Account
 from sprag_study.service.storage.people.scopes import user_name
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     import httpx
+    from joserfc.jwk import Key
 
     from sprag_study.service.settings import Settings
 
 _LOG = logging.getLogger("sprag.access")
 
-LOGIN_COOKIE: Final = "sprag_login"
+#: Each login that has begun has its cookie, so that several tabs can log in: this, and the beginning of the state.
+LOGIN_COOKIE: Final = "sprag_login_"
+_STATE_IN_NAME: Final = 12
+#: Most logins that a browser keeps; the oldest ones go.
+_MOST_LOGINS: Final = 5
 #: Seconds in which somebody can log in at the provider.
 LOGIN_SECONDS: Final = 600
+#: Seconds for which the browser keeps the cookie: a login that took too long still knows where it was to lead.
+COOKIE_SECONDS: Final = 3600
 #: Seconds for which the addresses of the provider are kept, and for each of its answers.
 _KEPT_SECONDS: Final = 3600.0
 _TIMEOUT: Final = 10.0
@@ -47,6 +55,8 @@ _LONGEST: Final = 1500
 #: Signatures by a key that only the provider has.
 _ALGORITHMS: Final = ("RS256", "RS384", "RS512", "PS256", "PS384", "PS512", "ES256", "ES384", "ES512")
 _KEY_TYPES: Final = ("RSA", "EC")
+#: Errors by which the provider says that it cannot answer now (RFC 6749, section 4.1.2.1).
+_OUTAGES: Final = ("server_error", "temporarily_unavailable")
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,14 +72,23 @@ class Login:
         """What its cookie has, apart from the signature."""
         return f"{self.state}.{self.end}.{urlsafe_b64encode(self.wanted.encode()).decode().rstrip('=')}"
 
+    @property
+    def cookie(self) -> str:
+        """Name of its cookie."""
+        return f"{LOGIN_COOKIE}{self.state[:_STATE_IN_NAME]}"
 
-@dataclass(frozen=True, slots=True)
-class Account:
-    """Who logged in: digest of issuer and subject, name of the user, and the role, None where groups give none."""
+    @property
+    def has_ended(self) -> bool:
+        """Whether it took too long."""
+        return time.time() >= self.end
 
-    subject: str
-    name: str
-    role: Role | None
+
+class RefusedAccountError(ApiError):
+    """What the provider says of an ``account`` lets nobody in."""
+
+    def __init__(self, why: Sentence, account: Account) -> None:
+        super().__init__("unauthorized", why)
+        self.account = account
 
 
 def begin(wanted: str) -> Login:
@@ -83,15 +102,28 @@ def cookie_of(login: Login, sealed: Callable[[str], str]) -> str:
     return f"{login.text}.{sealed(f'login {login.text}')}"
 
 
-def login_of(cookies: Mapping[str, str], sealed: Callable[[str], str]) -> Login | None:
-    """The login in the cookies; None where there is none, or it has ended."""
-    text, dot, seal = cookies.get(LOGIN_COOKIE, "").rpartition(".")
-    if not dot or not hmac.compare_digest(seal.encode("utf-8", "replace"), sealed(f"login {text}").encode()):
-        return None
-    state, end, wanted = text.split(".")
-    padded = wanted + "=" * (-len(wanted) % 4)
-    login = Login(state, urlsafe_b64decode(padded).decode(), int(end))
-    return login if time.time() < login.end else None
+def login_of(cookies: Mapping[str, str], state: str, sealed: Callable[[str], str]) -> Login | None:
+    """The login of this ``state`` in the cookies, which may have ended; None where there is none."""
+    return next((login for login in _logins(cookies, sealed) if login.state == state), None)
+
+
+def surplus(cookies: Mapping[str, str], sealed: Callable[[str], str]) -> list[str]:
+    """Names of the cookies that go when another login begins: forged ones, and the oldest ones."""
+    latest = sorted(_logins(cookies, sealed), key=lambda login: login.end, reverse=True)
+    kept = {login.cookie for login in latest[: _MOST_LOGINS - 1]}
+    return [name for name in cookies if name.startswith(LOGIN_COOKIE) and name not in kept]
+
+
+def _logins(cookies: Mapping[str, str], sealed: Callable[[str], str]) -> Iterator[Login]:
+    """Every login in the cookies."""
+    for name, value in cookies.items():
+        text, dot, seal = value.rpartition(".")
+        if not name.startswith(LOGIN_COOKIE) or not dot:
+            continue
+        if hmac.compare_digest(seal.encode("utf-8", "replace"), sealed(f"login {text}").encode()):
+            state, end, wanted = text.split(".")
+            padded = wanted + "=" * (-len(wanted) % 4)
+            yield Login(state, urlsafe_b64decode(padded).decode(), int(end))
 
 
 class Provider:
@@ -133,12 +165,12 @@ class Provider:
         address = str(about["authorization_endpoint"])
         return f"{address}{'&' if '?' in address else '?'}{urlencode(asked)}"
 
-    async def account(self, login: Login, given: Mapping[str, str], back: str) -> Account:
-        """Who logged in, from what the provider gave the browser; raises ApiError."""
-        if not hmac.compare_digest(given.get("state", "").encode(), login.state.encode()):
-            raise _refused(
-                Sentence("This login was not begun in this browser, or another one was begun since: try again.")
-            )
+    async def account(self, login: Login, given: Mapping[str, str], back: str) -> tuple[Account, Role | None]:
+        """Who logged in, from what the provider gave the browser, and the role, None where the groups give none.
+
+        Raises ApiError: `unauthorized` where what the browser sent is refused, `unavailable` where the provider cannot
+        be used.
+        """
         about = await self._about()
         issuer = given.get("iss")
         required = about.get("authorization_response_iss_parameter_supported") is True
@@ -146,31 +178,35 @@ class Provider:
             raise _refused(Sentence("The answer is that of another provider."))
         if "error" in given or not given.get("code"):
             _LOG.warning("The OpenID provider refused a login: %.200r", given.get("error"))
+            if given.get("error") in _OUTAGES:
+                raise _unusable()
             raise _refused(Sentence("The provider did not let you in."))
         async with _client() as client:
             tokens = await self._tokens(client, about, login, given["code"], back)
             claims = await self._id_token(client, about, login, tokens)
             return self._account({**await self._further(client, about, claims, tokens), **claims})
 
-    def _account(self, claims: Mapping[str, Any]) -> Account:
+    def _account(self, claims: Mapping[str, Any]) -> tuple[Account, Role | None]:
         settings = self._settings
         named = settings.oidc_name_claim
+        subject = hashlib.sha256(f"{settings.oidc_issuer}\n{claims['sub']}".encode()).hexdigest()
         name = _claim(claims, named)
-        if not isinstance(name, str) or not name:
-            raise _refused(Sentence("The provider did not say who you are: there is no claim {claim}.", claim=named))
+        account = Account(settings.oidc_issuer, subject, name if isinstance(name, str) else "")
+        if not account.name:
+            why = Sentence("The provider did not say who you are: there is no claim {claim}.", claim=named)
+            raise RefusedAccountError(why, account)
         if named == "email" and claims.get("email_verified") is not True:
-            raise _refused(Sentence("The provider has not verified the address in the claim {claim}.", claim=named))
+            why = Sentence("The provider has not verified the address in the claim {claim}.", claim=named)
+            raise RefusedAccountError(why, account)
         try:
-            user_name(name)
+            user_name(account.name)
         except FaultError:
-            raise _refused(Sentence("The claim {claim} is not the name of a user.", claim=named)) from None
+            why = Sentence("The claim {claim} is not the name of a user.", claim=named)
+            raise RefusedAccountError(why, account) from None
         groups = _claim(claims, settings.oidc_groups_claim)
         listed = [groups] if isinstance(groups, str) else groups if isinstance(groups, list) else []
         role = settings.role_of(tuple(group for group in listed if isinstance(group, str)))
-        if settings.oidc_roles and role is None:
-            raise ApiError("not-allowed", Sentence("None of your groups may use this service."))
-        subject = hashlib.sha256(f"{settings.oidc_issuer}\n{claims['sub']}".encode()).hexdigest()
-        return Account(subject, name, None if role is None else Role(role))
+        return account, None if role is None else Role(role)
 
     def _derived(self, purpose: str, login: Login) -> str:
         return self._sealed(f"login {purpose} {login.state}")
@@ -223,8 +259,7 @@ class Provider:
         from joserfc.jwk import KeySet
         from joserfc.jws import JWSRegistry
 
-        published = await _json(client, "GET", about["jwks_uri"])
-        keys = [key for key in published.get("keys", []) if key.get("kty") in _KEY_TYPES and key.get("use") != "enc"]
+        keys = _usable_keys(await _json(client, "GET", about["jwks_uri"]))
         params = {
             "nonce": self._derived("nonce", login),
             "client_id": self._settings.oidc_client_id,
@@ -236,11 +271,11 @@ class Provider:
         }
         try:
             registry = JWSRegistry(algorithms=list(_ALGORITHMS), strict_check_header=False)
-            token = jwt.decode(
-                str(tokens.get("id_token", "")), KeySet.import_key_set({"keys": keys}), registry=registry
-            )
+            token = jwt.decode(str(tokens.get("id_token", "")), KeySet(keys), registry=registry)
             claims = CodeIDToken(token.claims, token.header, options, params)
             claims.validate(leeway=_LEEWAY)
+            if not (isinstance(claims["sub"], str) and claims["sub"]):
+                raise ValueError("the subject is no text, or empty")
         except (JoseError, ValueError, TypeError, KeyError) as error:
             _LOG.warning("An ID token of the OpenID provider does not hold: %s: %s", type(error).__name__, error)
             raise _refused(Sentence("What the provider says of you does not hold: try again.")) from error
@@ -259,10 +294,33 @@ class Provider:
         if "userinfo_endpoint" not in about or all(_claim(claims, name) is not None for name in wanted):
             return {}
         bearer = {"Authorization": f"Bearer {tokens.get('access_token')}"}
-        found = await _json(client, "GET", about["userinfo_endpoint"], headers=bearer)
-        if found.get("sub") != claims["sub"]:
+        further = await _json(client, "GET", about["userinfo_endpoint"], headers=bearer)
+        if further.get("sub") != claims["sub"]:
+            _LOG.warning("The userinfo of the OpenID provider is that of another account.")
             raise _refused(Sentence("What the provider says of you does not hold: try again."))
-        return found
+        return further
+
+
+def _usable_keys(published: Mapping[str, Any]) -> list[Key]:
+    """The keys that the provider signs with; those that cannot be used are left out (RFC 7517, section 5).
+
+    Raises ApiError where there is none.
+    """
+    from joserfc.errors import JoseError
+    from joserfc.jwk import JWKRegistry
+
+    listed, keys = published.get("keys"), []
+    for key in listed if isinstance(listed, list) else []:
+        if not isinstance(key, dict) or key.get("kty") not in _KEY_TYPES or key.get("use") == "enc":
+            continue
+        try:
+            keys.append(JWKRegistry.import_key(key))
+        except (JoseError, ValueError, TypeError, KeyError) as error:
+            _LOG.warning("A key of the OpenID provider cannot be used: %s: %s", type(error).__name__, error)
+    if not keys:
+        _LOG.error("The OpenID provider publishes no key that can be used.")
+        raise _unusable()
+    return keys
 
 
 def _client() -> httpx.AsyncClient:
@@ -291,11 +349,12 @@ async def _json(client: httpx.AsyncClient, method: str, url: str, **sent: Any) -
     except (httpx.HTTPError, httpx.InvalidURL, ValueError) as error:
         _LOG.error("The OpenID provider cannot be used at %s: %s: %s", url, type(error).__name__, error)
         raise _unusable() from error
-    if answer.status_code == 400 and isinstance(found, dict):  # of a code: expired, used, or of somebody else
-        _LOG.warning("The OpenID provider refused at %s: %.200r", url, found.get("error"))
+    reason = found.get("error") if isinstance(found, dict) else None
+    if answer.status_code == 400 and reason == "invalid_grant":  # of a code: expired, used, or of somebody else
+        _LOG.warning("The OpenID provider refused at %s: %.200r", url, reason)
         raise _refused(Sentence("The provider did not let you in."))
     if answer.status_code != 200 or not isinstance(found, dict):
-        _LOG.error("The OpenID provider answered %s at %s", answer.status_code, url)
+        _LOG.error("The OpenID provider answered %s at %s: %.200r", answer.status_code, url, reason)
         raise _unusable()
     return found
 

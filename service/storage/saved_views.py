@@ -14,7 +14,7 @@ from sprag_study.service.faults import Fault, FaultError
 from sprag_study.service.spec.saved_views import View
 from sprag_study.service.storage.errors import TooManyViewsError, ViewNotFoundError
 from sprag_study.service.storage.part import Part, change_row, moment, row_of
-from sprag_study.service.storage.people.audit import edition_of, note, require_edition, require_owner
+from sprag_study.service.storage.people.audit import differences, edition_of, note, require_edition, require_owner
 from sprag_study.service.storage.people.pools import pool_of
 from sprag_study.service.storage.tables import METADATA, STUDIES
 from sprag_study.worker.limits import MAX_REPORT_FIGURES, MAX_VIEWS
@@ -147,9 +147,12 @@ class Views(Part):
                 connection.execute(sa.update(SAVED_VIEWS).where(_V.id == view_id).values(values))
             kept = row.place is not None if change.in_report is None else change.in_report
             wanted = kept or change.place is not None
-            note(connection, self._now(), "view.change", view_id, name=change.name or row.name, in_report=wanted)
             self._put_in_report(connection, row, wanted=wanted, place=change.place or row.place)
-            return _record(_row_of(connection, view_id))
+            after = _row_of(connection, view_id)
+            fields = ("name", "query", "place")
+            detail = differences(*({field: getattr(each, field) for field in fields} for each in (row, after)))
+            note(connection, self._now(), "view.change", view_id, name=after.name, in_report=wanted, **detail)
+            return _record(after)
 
     def remove(self, view_id: str, read: Collection[str] | None = None) -> None:
         """Remove a view; raises ViewNotFoundError, NotOwnerError; ``read`` as for `change`."""

@@ -17,13 +17,14 @@ from sprag_study.service.actor import Actor, Door, Role, act_as, acting, of_mach
 from sprag_study.service.faults import FaultError
 from sprag_study.service.spec.components import Component
 from sprag_study.service.spec.labels import StudyChange
-from sprag_study.service.spec.saved_views import View
+from sprag_study.service.spec.saved_views import View, ViewChange
 from sprag_study.service.storage.errors import (
     IdempotencyConflictError,
     NotOwnerError,
     UserExistsError,
     UserNotFoundError,
 )
+from sprag_study.service.storage.people.accounts import Account
 from sprag_study.service.storage.people.audit import AuditFilter
 from sprag_study.service.storage.people.people import STUDY_BYTES, TEXTS, Quota
 from sprag_study.service.storage.people.scopes import TokenScope
@@ -302,3 +303,62 @@ def test_tokens_have_an_end_and_a_last_use(store: Store, clock: fakes.HandClock)
         assert kept.used_at is not None
         assert kept.used_at.timestamp() == expected
     assert (kept.owner, kept.expires_at) == ("dora", end)
+
+
+def test_only_a_removed_user_is_restored_which_forgets_the_account(store: Store) -> None:
+    store.people.add_user("dora", Role.DESIGNER)
+    account = Account("https://login.example", "0" * 64, "dora")
+    other = Account("https://login.example", "1" * 64, "dora")
+    signed_in = store.people.sign_in(account, None, create=False)
+    assert store.people.change_user("dora", removed=False) == signed_in
+    with pytest.raises(FaultError, match="Another account"):
+        store.people.sign_in(other, None, create=False)
+    assert store.people.change_user("dora", removed=True).session_salt != signed_in.session_salt
+    store.people.change_user("dora", removed=True)
+    store.people.change_user("dora", removed=False)
+    store.people.sign_in(other, None, create=False)
+    log = [(row.action, row.detail) for row in store.audit.rows(AuditFilter())]
+    assert log == [
+        ("user.add", {"role": "designer"}),
+        ("user.change", {"login": True}),
+        ("user.remove", {}),
+        ("user.restore", {"account": "forgotten"}),
+        ("user.change", {"login": True}),
+    ]
+
+
+def test_a_change_that_changes_nothing_is_no_row_and_a_contradiction_is_refused(store: Store) -> None:
+    store.people.add_user("dora", Role.DESIGNER, Quota(cases=7))
+    before = actions(store)
+    store.people.change_user("dora", Role.DESIGNER, Quota(cases=7))
+    assert actions(store) == before
+    with pytest.raises(FaultError) as refused:
+        store.people.change_user("dora", quota=Quota(cases=5), as_set=["cases"])
+    assert [fault.where for fault in refused.value.faults] == ["cases"]
+    with pytest.raises(FaultError) as refused:
+        store.people.hand_over("dora", "dora")
+    assert [fault.where for fault in refused.value.faults] == ["to"]
+    assert actions(store) == before
+
+
+def test_renewing_tokens_is_no_way_past_the_limit(store: Store) -> None:
+    store.people.add_user("dora", Role.DESIGNER)
+    store.people.most_tokens = 3
+    _, token = store.people.create_token("laptop", TokenScope.WRITE, owner="dora")
+    for _ in range(2):
+        _, token = store.people.renew_token(token.id, timedelta(days=1))
+    with pytest.raises(FaultError, match="dora has 3 valid tokens"):
+        store.people.renew_token(token.id, timedelta(days=1))
+    (dora,) = store.people.users()
+    now = store.clock.now()
+    assert [made.state_at(now, dora) for made in store.people.tokens()] == ["valid"] * 3
+
+
+def test_the_log_has_the_values_before_and_after(store: Store) -> None:
+    made = create(store)
+    store.studies.change(made.id, StudyChange(name="b", notes="n" * 600, tags=("x",)))
+    view = store.views.save(View("studies", "mine", "owner=dora"))
+    store.views.change(view.id, ViewChange(name="ours", query="owner=emil"))
+    log = {row.action: row.detail.get("changes") for row in store.audit.rows(AuditFilter())}
+    assert log["study.change"] == {"name": [made.name, "b"], "notes": ["", "n" * 500 + "…"], "tags": [[], ["x"]]}
+    assert log["view.change"] == {"name": ["mine", "ours"], "query": ["owner=dora", "owner=emil"]}

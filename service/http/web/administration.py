@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import timedelta
 from typing import TYPE_CHECKING, Final
 
@@ -82,9 +83,17 @@ def change_user(context: Context, values: Mapping[str, str], *, first: bool) -> 
     cases, storage, checks = (_count(values, field, below) for field, below in _QUOTAS.items())
     quota = Quota(cases, None if storage is None else storage * _MIB, checks)
     if do == "change":
-        if any(user.name == name and user.removed_at is not None for user in people.users()):
+        known = next((user for user in people.users() if user.name == name), None)
+        if known is not None and known.removed_at is not None:
             raise parameter_error("name", "conflict", N_("is removed: restore this user first"), name)
         as_set = [own for field, own in _OWN.items() if values.get(f"{field} as set")]
+        if known is not None:  # the form repeats the present numbers, in MiB
+            kept = {
+                own: None
+                for own in as_set
+                if _shown(getattr(quota, own), own) == _shown(getattr(known.quota, own), own)
+            }
+            quota = replace(quota, **kept)
         people.change_user(name, role, quota, as_set=as_set)
         return None
     if first and role is not Role.ADMINISTRATOR:
@@ -124,6 +133,11 @@ def change_token(
         return people.renew_token(token_id, GRACE)
     people.revoke_token(token_id)
     return None
+
+
+def _shown(number: int | None, own: str) -> int | None:
+    """A number of a quota as the form has it."""
+    return number // _MIB if number is not None and own == "bytes" else number
 
 
 def _count(values: Mapping[str, str], field: str, below: int, least: int = 0) -> int | None:

@@ -24,7 +24,7 @@ from sprag_study.service.storage.part import MAX_INTEGER, Part, micros_of, momen
 from sprag_study.service.storage.people.tables import AUDIT_LOG
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator
+    from collections.abc import Collection, Iterator, Mapping
 
 
 def edition_of(*content: object) -> str:
@@ -45,6 +45,8 @@ _A = AUDIT_LOG.c
 #: Rows read at a time for a file of the whole log.
 _BLOCK: Final = 1000
 _LONGEST: Final = 200
+#: Longest text of a change, such as notes.
+_LONGEST_VALUE: Final = 500
 TIME_ALLOWED: Final = N_("a date or time such as 2027-01-31 or 2027-01-31T06:00+01:00; without an offset it is UTC")
 
 
@@ -130,6 +132,16 @@ def note(connection: sa.Connection, now: int, action: str, target: str, /, **det
         "detail": json.dumps(detail, ensure_ascii=False, allow_nan=False),
     }
     connection.execute(sa.insert(AUDIT_LOG).values(values))
+
+
+def differences(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
+    """What differs of plain values, before and after, as detail of a row, with long texts cut; empty: nothing."""
+    changes = {name: [_cut(before[name]), _cut(after[name])] for name in after if before[name] != after[name]}
+    return {"changes": changes} if changes else {}
+
+
+def _cut(value: Any) -> Any:
+    return f"{value[:_LONGEST_VALUE]}…" if isinstance(value, str) and len(value) > _LONGEST_VALUE else value
 
 
 def require_owner(kind: str, identity: str, owner: str | None) -> None:

@@ -10,20 +10,21 @@ sessions that were ended early.
 from __future__ import annotations
 
 import hashlib
+import logging
 import secrets
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
 from sprag_study.sentences import Sentence
-from sprag_study.service.actor import Door, Role, acting
+from sprag_study.service.actor import Door, Role, act_as, acting
 from sprag_study.service.faults import FaultError, parameter_error
 from sprag_study.service.languages import N_, grouped, recorded
 from sprag_study.service.storage.components import COMPONENTS
 from sprag_study.service.storage.errors import TokenNotFoundError, UserExistsError, UserNotFoundError
 from sprag_study.service.storage.part import Part, micros_of, moment, optional_moment
-from sprag_study.service.storage.people.audit import note
+from sprag_study.service.storage.people.audit import differences, note
 from sprag_study.service.storage.people.pools import pool_of
 from sprag_study.service.storage.people.scopes import TokenScope, TokenState
 from sprag_study.service.storage.people.tables import ENDED_SESSIONS, SESSION_KEY, TOKENS, USERS
@@ -36,6 +37,9 @@ if TYPE_CHECKING:
     from datetime import datetime, timedelta
 
     from sprag_study.service.settings import Settings
+    from sprag_study.service.storage.people.accounts import Account
+
+_LOG = logging.getLogger("sprag.access")
 
 _U = USERS.c
 #: The texts of a study, which people can make long.
@@ -48,6 +52,7 @@ WAITING_STUDY = ~ENDED & STUDIES.c.waits_for.is_distinct_from(HELD_AT_DEADLINE)
 TOKEN_PREFIX: Final = "sprag_"  # noqa: S105 - the beginning of all tokens is no secret
 _TOKEN_BYTES: Final = 32
 _KEY_BYTES: Final = 32
+_SALT_BYTES: Final = 16
 #: A day in microseconds.
 _DAY: Final = 24 * 3600 * 1_000_000
 #: Primary key of the only row of the key's table.
@@ -79,13 +84,17 @@ def quota_of(settings: Settings) -> Quota:
 
 @dataclass(frozen=True, slots=True)
 class UserRecord:
-    """A user; ``removed_at`` is None for one who may use the service. ``quota`` is the user's own."""
+    """A user; ``removed_at`` is None for one who may use the service. ``quota`` is the user's own.
+
+    ``session_salt`` is signed with the sessions that begin at the OpenID provider: they end when it changes.
+    """
 
     name: str
     role: Role
     created_at: datetime
     removed_at: datetime | None
     quota: Quota
+    session_salt: str = field(default="", repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,63 +186,91 @@ class People(Part):
         """Change the given fields of a user, whose studies, schedules and tokens are kept; raises UserNotFoundError.
 
         A number of ``quota`` that is None is kept, but where ``as_set`` names it (cases, bytes, checks): then the
-        settings have it again. Tokens of a removed user are worth nothing until the user is restored. On pages the last
-        administrator stays: raises FaultError.
+        settings have it again; both at once raise FaultError. Tokens of a removed user are worth nothing until the user
+        is restored, which forgets the account at the OpenID provider; sessions end for good. Nothing is done to
+        remove a removed user, or to restore an active one. On pages the last administrator stays: raises FaultError.
         """
         given = {column: value for column, value in _columns(quota or Quota()).items() if value is not None}
+        both = [number for number in as_set if f"most_{number}" in given]
+        if both:
+            where = "storage" if both[0] == "bytes" else both[0]
+            raise parameter_error(where, "conflict", N_("is a number, and as set for all users: give one of them"))
         values: dict[str, Any] = {**given, **({} if role is None else {"role": role.value})}
         values |= {f"most_{number}": None for number in as_set}
-        if removed is not None:
-            values["removed_at"] = sa.func.coalesce(_U.removed_at, self._now()) if removed else None
-            if not removed:  # the account at the OpenID provider may be another one by now
-                values["subject"] = None
         with self.session.write() as connection:
             _require_standing(connection, self._now())
             old = connection.execute(sa.select(USERS).where(_U.name == name)).one_or_none()
-            if old is None or not values:
+            if old is None:
                 raise UserNotFoundError(name)
+            moved = removed is not None and removed != (old.removed_at is not None)
+            if moved and removed:
+                values |= {"removed_at": self._now(), "session_salt": _salt()}
+            elif moved:  # the account at the OpenID provider may be another one by now
+                values |= {"removed_at": None, "subject": None, "issuer": None}
+            if not values:
+                return _user_record(old)
             before = acting().door is Door.PAGE and _is_administered(connection)
             row = connection.execute(sa.update(USERS).where(_U.name == name).values(values).returning(USERS)).one()
             if before and not _is_administered(connection):
                 raise parameter_error("role", "conflict", N_("is that of the last administrator"), name)
-            action = "user.change" if removed is None else "user.remove" if removed else "user.restore"
-            note(connection, self._now(), action, name, **_changes(old, row))
+            detail = _changes(old, row)
+            if moved and not removed and old.subject is not None:
+                detail["account"] = "forgotten"
+            if moved or detail:
+                action = "user.change" if not moved else "user.remove" if removed else "user.restore"
+                note(connection, self._now(), action, name, **detail)
             return _user_record(row)
 
-    def sign_in(self, subject: str, name: str, role: Role | None, *, create: bool) -> UserRecord:
-        """The user of the account ``subject`` at the OpenID provider, with the ``role`` that its groups give.
+    def sign_in(self, account: Account, role: Role | None, *, create: bool) -> UserRecord:
+        """The user of an account at the OpenID provider, with the ``role`` that its groups give; None: the present one.
 
-        The first login of an account takes the user of that ``name``; with ``create`` it adds one who is not there.
-        From then on the account is that user, whatever its name. Raises FaultError where nobody may come in by it.
+        The first login of an account takes the user of its name; with ``create`` it adds one who is not there. From
+        then on the account is that user, whatever its name, until the user is restored, or an account of another issuer
+        takes the user in the same way. The last administrator keeps the role. Raises FaultError where nobody may come
+        in by the account.
         """
         with self.session.write() as connection:
-            row = connection.execute(sa.select(USERS).where(_U.subject == subject)).one_or_none()
-            row = row or connection.execute(sa.select(USERS).where(_U.name == name)).one_or_none()
-            now, values = self._now(), {"subject": subject, **({} if role is None else {"role": role.value})}
+            row = _of_account(connection, account)
+            row = row or connection.execute(sa.select(USERS).where(_U.name == account.name)).one_or_none()
+            now, link = self._now(), {"subject": account.subject, "issuer": account.issuer}
             if row is None:
                 if not create or role is None:
-                    raise FaultError("not-allowed", Sentence(recorded.NO_USER, user=name))
-                row = connection.execute(
-                    sa.insert(USERS).values(name=name, created_at=now, **values).returning(USERS)
-                ).one()
-                note(connection, now, "user.add", name, role=row.role, login=True)
+                    raise FaultError("not-allowed", Sentence(recorded.NO_USER, user=account.name))
+                values = {**link, "name": account.name, "role": role.value, "session_salt": _salt()}
+                row = connection.execute(sa.insert(USERS).values(created_at=now, **values).returning(USERS)).one()
+                _note_login(connection, now, "user.add", row.name, role=row.role, login=True)
                 return _user_record(row)
             if row.removed_at is not None:
                 raise FaultError("not-allowed", Sentence(recorded.USER_REMOVED, user=row.name))
-            if row.subject not in (None, subject):
+            first = row.subject != account.subject
+            if first and row.subject is not None and row.issuer in (None, account.issuer):
                 raise FaultError("not-allowed", Sentence(recorded.OTHER_ACCOUNT, user=row.name))
-            change = sa.update(USERS).where(_U.name == row.name).values(values).returning(USERS)
-            after = connection.execute(change).one()
-            if row.subject is None or row.role != after.role:
-                first = {"login": True} if row.subject is None else {}
-                note(connection, now, "user.change", row.name, **first, **_changes(row, after))
+            salt = {"session_salt": _salt()} if first else {}  # sessions of another account end
+            after, detail = _changed_by_login(connection, row, role, **link, **salt)
+            if first and row.issuer is not None:
+                detail["issuer"] = [row.issuer, account.issuer]
+            if first or detail:
+                _note_login(connection, now, "user.change", row.name, **({"login": True} if first else {}), **detail)
             return _user_record(after)
+
+    def withdraw(self, account: Account) -> None:
+        """End the sessions of the user of an account whose groups give no role any more; the user becomes a viewer.
+
+        The last administrator keeps the role. Nothing is done for an account that is no user yet.
+        """
+        with self.session.write() as connection:
+            row = _of_account(connection, account)
+            if row is not None and row.removed_at is None:
+                _, detail = _changed_by_login(connection, row, Role.VIEWER, session_salt=_salt())
+                _note_login(connection, self._now(), "user.change", row.name, sessions="ended", **detail)
 
     def hand_over(self, name: str, heir: str) -> tuple[int, int]:
         """Give the studies, schedules, components and views of a user to another; returns the numbers of the first two.
 
-        Raises UserNotFoundError.
+        Raises UserNotFoundError, and FaultError for a user and the same again.
         """
+        if name == heir:
+            raise parameter_error("to", "conflict", N_("is the user whose studies these are"), heir)
         with self.session.write() as connection:
             _require_standing(connection, self._now())
             for each in (name, heir):
@@ -287,7 +324,7 @@ class People(Part):
         ends = None if expires_at is None else micros_of(expires_at)
         with self.session.write() as connection:
             _require_standing(connection, self._now())
-            self._require_few_tokens(connection, owner, self.most_tokens)
+            self._require_few_tokens(connection, owner)
             fields = {"name": name, "scope": scope.value, "owner": owner}
             return _new_token(connection, self._now(), fields, ends)
 
@@ -295,7 +332,7 @@ class People(Part):
         """Another token of the same name, scope, owner and length of life; the former is valid for ``grace`` at most.
 
         Returns what `create_token` returns; raises TokenNotFoundError, also for one that was revoked or renewed, or
-        has expired, UserNotFoundError, and FaultError beyond twice `most_tokens`.
+        has expired, UserNotFoundError, and FaultError beyond `most_tokens`, for which the former counts while it runs.
         """
         c, now = TOKENS.c, self._now()
         valid = c.revoked_at.is_(None) & sa.func.coalesce(c.expires_at > now, sa.true())
@@ -304,16 +341,15 @@ class People(Part):
             row = connection.execute(sa.select(TOKENS).where(c.id == token_id, valid)).one_or_none()
             if row is None:
                 raise TokenNotFoundError(token_id)
-            # The former one still counts for a while, and renewing it is no way past the limit.
-            self._require_few_tokens(connection, row.owner, 2 * self.most_tokens)
+            self._require_few_tokens(connection, row.owner)
             ends = None if row.expires_at is None else now + row.expires_at - row.created_at
             last = micros_of(moment(now) + grace)
             connection.execute(sa.update(TOKENS).where(c.id == token_id).values(revoked_at=last))
             same = {"name": row.name, "scope": row.scope, "owner": row.owner}
             return _new_token(connection, now, same, ends, instead_of=token_id)
 
-    def _require_few_tokens(self, connection: sa.Connection, owner: str | None, most: int) -> None:
-        """Raise FaultError where a user has ``most`` valid tokens, or was given four times as many within a day."""
+    def _require_few_tokens(self, connection: sa.Connection, owner: str | None) -> None:
+        """Raise FaultError where a user has the most valid tokens, or was given four times as many within a day."""
         if owner is None or not self.most_tokens:
             return
         c, now = TOKENS.c, self._now()
@@ -321,7 +357,7 @@ class People(Part):
         today = c.created_at > now - _DAY
         count = (sa.func.coalesce(sa.func.sum(sa.case((each, 1), else_=0)), 0) for each in (valid, today))
         there, lately = connection.execute(sa.select(*count).where(c.owner == owner)).one()
-        if there >= most:
+        if there >= self.most_tokens:
             raise FaultError("quota-exceeded", Sentence(recorded.MANY_TOKENS, user=owner, count=int(there)))
         if lately >= 4 * self.most_tokens:
             raise FaultError("quota-exceeded", Sentence(recorded.TOKENS_LATELY, user=owner, count=int(lately)))
@@ -405,6 +441,38 @@ def _is_administered(connection: sa.Connection) -> bool:
     return connection.execute(sa.select(_U.name).where(administers)).first() is not None
 
 
+def _of_account(connection: sa.Connection, account: Account) -> Any:
+    """The row of the user that an account is; None where it is none yet."""
+    return connection.execute(sa.select(USERS).where(_U.subject == account.subject)).one_or_none()
+
+
+def _changed_by_login(
+    connection: sa.Connection, row: Any, role: Role | None, **values: str
+) -> tuple[Any, dict[str, Any]]:
+    """The row of a user with the ``role`` of a login and further ``values``, and what the log says of it.
+
+    Where nobody else is an administrator, the user stays one: otherwise nobody could let people in on pages.
+    """
+    mine, detail = _U.name == row.name, {}
+    given = row.role if role is None else role.value
+    after = connection.execute(sa.update(USERS).where(mine).values(role=given, **values).returning(USERS)).one()
+    if row.role == Role.ADMINISTRATOR.value and not _is_administered(connection):
+        after = connection.execute(sa.update(USERS).where(mine).values(role=row.role).returning(USERS)).one()
+        detail = {"kept": {"role": [row.role, given]}}
+        _LOG.warning("%r is the last administrator and stays one; the groups of the login give: %s.", row.name, given)
+    return after, {**detail, **_changes(row, after)}
+
+
+def _note_login(connection: sa.Connection, now: int, action: str, name: str, **detail: Any) -> None:
+    """Note what a login changed; the user acts, whatever the name at the provider is."""
+    with act_as(replace(acting(), name=name, user=name)):
+        note(connection, now, action, name, **detail)
+
+
+def _salt() -> str:
+    return secrets.token_hex(_SALT_BYTES)
+
+
 def _require_standing(connection: sa.Connection, now: int) -> None:
     """Raise FaultError where who acts on a page was removed or revoked meanwhile, or is no longer an administrator.
 
@@ -479,12 +547,10 @@ def _set(quota: Quota | None) -> dict[str, int]:
     return {name: value for name, value in _columns(quota or Quota()).items() if value is not None}
 
 
-def _changes(old: Any, new: Any) -> dict[str, dict[str, list[Any]]]:
+def _changes(old: Any, new: Any) -> dict[str, Any]:
     """What differs in a row of a user, before and after, for the log; a quota that is None is as set."""
     names = ("role", *_columns(Quota()))
-    changes = {name: [getattr(old, name), getattr(new, name)] for name in names}
-    changes = {name: pair for name, pair in changes.items() if pair[0] != pair[1]}
-    return {"changes": changes} if changes else {}
+    return differences(*({name: getattr(row, name) for name in names} for row in (old, new)))
 
 
 def _quota(row: Any) -> Quota:
@@ -492,7 +558,8 @@ def _quota(row: Any) -> Quota:
 
 
 def _user_record(row: Any) -> UserRecord:
-    return UserRecord(row.name, Role(row.role), moment(row.created_at), optional_moment(row.removed_at), _quota(row))
+    removed, salt = optional_moment(row.removed_at), row.session_salt or ""
+    return UserRecord(row.name, Role(row.role), moment(row.created_at), removed, _quota(row), salt)
 
 
 def _mib(size: int) -> str:

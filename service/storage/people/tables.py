@@ -20,6 +20,10 @@ USERS = sa.Table(
     sa.Column("most_checks", sa.Integer),
     # SHA-256 of issuer and subject of the account at the OpenID provider; NULL for who never logged in there.
     sa.Column("subject", sa.String(64)),
+    # The issuer of this account; NULL also for accounts from before revision 0045.
+    sa.Column("issuer", sa.Text),
+    # Signed with the cookies of sessions that begin at the provider, so that another text ends them; NULL: none.
+    sa.Column("session_salt", sa.String(32)),
     sa.Index("ix_users_subject", "subject", unique=True),
     sqlite_autoincrement=True,
 )

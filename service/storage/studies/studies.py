@@ -41,7 +41,7 @@ from sprag_study.service.storage.part import (
     move_row,
     row_of,
 )
-from sprag_study.service.storage.people.audit import by_sender, note, require_edition, require_owner
+from sprag_study.service.storage.people.audit import by_sender, differences, note, require_edition, require_owner
 from sprag_study.service.storage.people.people import STUDY_BYTES, TEXTS, require_queue, size_of_texts
 from sprag_study.service.storage.people.pools import rank_of
 from sprag_study.service.storage.rows.case_keys import KEYED, NOT_YET, TOO_MANY, add_keys
@@ -431,7 +431,9 @@ class Studies(Part):
             require_edition("study", study_id, self._study_record(connection, study_id).etag, read)
             name = row.name if change.name is None else change.name
             notes = row.notes if change.notes is None else change.notes
-            tags = changed_tags(tuple(row.tags.split("\n")[1:-1]), change)
+            old = {"name": row.name, "notes": row.notes, "tags": row.tags.split("\n")[1:-1]}
+            old["archived"] = row.archived_at is not None
+            tags = changed_tags(tuple(old["tags"]), change)
             archived_at = row.archived_at
             if change.archived is not None:
                 archived_at = (archived_at or self._now()) if change.archived else None
@@ -447,11 +449,9 @@ class Studies(Part):
                 before: dict[str, str] = {field: getattr(row, field) for field in TEXTS if field in written}
                 self._people.require_quota(connection, 0, size_of_texts(written) - size_of_texts(before))
                 change_row(connection, row.number, **written)
-                detail = {field: value for field, value in changed.items() if field == "name"}
-                if "tags" in changed:
-                    detail["tags"] = list(tags)
-                if "archived_at" in changed:
-                    detail["archived"] = archived_at is not None
+                new = {"name": name, "notes": notes, "tags": list(tags), "archived": archived_at is not None}
+                detail = differences(old, new)
+                detail |= {field: new[field] for field in detail["changes"] if field != "notes"}
                 note(connection, self._now(), "study.change", study_id, fields=sorted(changed), **detail)
             return self._study_record(connection, study_id)
 

@@ -176,3 +176,7 @@ def test_users_are_listed_and_wrong_ones_refused(
     lines = run("admin", "db", "audit", "--action", "user.add", "--format", "jsonl")[1].splitlines()
     assert [json.loads(line)["target"] for line in lines] == ["dora", "ada"]
     assert run("admin", "db", "audit")[1].startswith("number,at,door,actor,")
+    document = json.loads(run("admin", "db", "audit", "--action", "user.add", "--json")[1])
+    assert [entry["target"] for entry in document["entries"]] == ["dora", "ada"]
+    assert json.loads(run("admin", "db", "audit", "--action", "none", "--json")[1]) == {"entries": []}
+    assert run("admin", "db", "audit", "--json", "--format", "csv")[1].startswith("number,")

@@ -148,6 +148,12 @@ def test_a_quota_is_as_set_again_and_tokens_have_a_limit(
         store.people.add_user("dora", Role.DESIGNER, Quota(5, 2**20, 2))
     changed = sprag("admin", "user", "change", "dora", "--as-set", "cases", "--as-set", "storage", "--json", *db).data
     assert (changed["most_cases"], changed["most_bytes"], changed["most_checks"]) == (None, None, 2)
+    for both, option in (
+        (("change", "dora", "--storage", "5", "--as-set", "storage"), "--storage"),
+        (("hand-over", "dora", "--to", "dora"), "--to"),
+    ):
+        refused = sprag("admin", "user", *both, "--json", *db)
+        assert (refused.code, [it["parameter"] for it in refused.failure["problems"]]) == (2, [option])
     monkeypatch.setenv("SPRAG_USER_TOKENS", "1")
     assert sprag("admin", "token", "create", "--name", "a", "--user", "dora", *db).code == 0
     refused = sprag("admin", "token", "create", "--name", "b", "--user", "dora", *db)

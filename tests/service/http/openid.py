@@ -26,7 +26,8 @@ class Openid:
     about, claims : further metadata, and further claims of the ID token; a claim that is None is left out
     userinfo : claims of the userinfo
     header, key : of the signature; without a key there is none
-    status : of the answer of the token endpoint
+    status, error : of the answer of the token endpoint
+    keys : that it publishes
     asked : forms that were sent to the token endpoint
     """
 
@@ -38,7 +39,8 @@ class Openid:
         self.about: dict[str, Any] = {}
         self.claims: dict[str, Any] = {}
         self.userinfo: dict[str, Any] = {}
-        self.status = 200
+        self.status, self.error = 200, "invalid_grant"
+        self.keys: object = [self.known.as_dict(private=False)]
         self.asked: list[dict[str, str]] = []
 
     def metadata(self) -> dict[str, Any]:
@@ -67,9 +69,9 @@ class Openid:
             case "/.well-known/openid-configuration":
                 return 200, self.metadata()
             case "/keys":
-                return 200, {"keys": [self.known.as_dict(private=False)]}
+                return 200, {"keys": self.keys}
             case "/token":
-                return self.status, self.tokens() if self.status == 200 else {"error": "invalid_grant"}
+                return self.status, self.tokens() if self.status == 200 else {"error": self.error}
             case "/userinfo":
                 return 200, {"sub": "s1", **self.userinfo}
         return 404, {}

@@ -23,9 +23,11 @@ from pydantic import SecretStr, ValidationError
 from sprag_study.service.actor import Door, Role, act_as, of_machine
 from sprag_study.service.http import access
 from sprag_study.service.http import oidc as logins
+from sprag_study.service.http.attempts import Attempts
 from sprag_study.service.http.guard import SECURITY_HEADERS
 from sprag_study.service.http.oidc import LOGIN_COOKIE, LOGIN_SECONDS
 from sprag_study.service.settings import Settings, UnsafeSettingsError
+from sprag_study.service.storage.people.accounts import Account
 from sprag_study.service.storage.people.audit import AuditFilter
 from tests.service.http.openid import CLIENT, Openid, openid
 from tests.service.http.people import OWN, Office
@@ -74,6 +76,22 @@ def logged_in(browser: httpx.Client, provider: Openid, wanted: str = "/", **clai
     return back(browser, asked)
 
 
+def login_cookie(asked: dict[str, str]) -> str:
+    """Name of the cookie of a login."""
+    return f"{LOGIN_COOKIE}{asked['state'][:12]}"
+
+
+def logins_of(browser: httpx.Client) -> list[str]:
+    """Names of the cookies of logins that a browser has."""
+    return [name for name in browser.cookies if name.startswith(LOGIN_COOKIE)]
+
+
+def no_login(answer: httpx.Response) -> str:
+    """What the login page says to a browser that comes back without a login."""
+    assert answer.status_code == 401
+    return why(answer)
+
+
 def why(answer: httpx.Response) -> str:
     """What the login page says is wrong."""
     found = re.search(r'<p class="fault" role="alert">(.*?)</p>', answer.text)
@@ -95,7 +113,7 @@ def test_a_first_login_makes_a_user_with_the_role_of_the_groups(
     assert (answer.status_code, answer.headers["location"]) == (303, "/compare?study=a")
     cookies = answer.headers.get_list("set-cookie")
     assert any(re.match(rf"{access.COOKIE}=[^;]+; HttpOnly; Max-Age=\d+; Path=/; SameSite=lax$", it) for it in cookies)
-    assert any(cookie.startswith(f'{LOGIN_COOKIE}="";') for cookie in cookies)
+    assert any(cookie.startswith(f'{login_cookie(asked)}="";') for cookie in cookies)
     (sent,) = provider.asked
     challenge = urlsafe_b64encode(sha256(sent["code_verifier"].encode()).digest()).decode().rstrip("=")
     assert (challenge, sent["code"]) == (asked["code_challenge"], "c1")
@@ -192,7 +210,7 @@ def test_a_user_is_one_account_and_a_removed_one_stays_out(
     [
         {"nonce": "another"}, {"nonce": None}, {"iss": "https://elsewhere.example"}, {"iss": None}, {"aud": "other"},
         {"aud": ["other", CLIENT]}, {"aud": [CLIENT], "azp": "other"}, {"exp": int(time.time()) - 3600}, {"exp": None},
-        {"iat": int(time.time()) + 3600}, {"iat": None}, {"sub": None}, {"at_hash": "wrong"},
+        {"iat": int(time.time()) + 3600}, {"iat": None}, {"sub": None}, {"sub": ""}, {"at_hash": "wrong"},
         {"nbf": int(time.time()) + 3600},
     ],
 )  # fmt: skip
@@ -229,31 +247,30 @@ def test_a_way_back_that_this_browser_did_not_begin_lets_nobody_in(
     asked = begun(mallory)
     provider.claims = {"nonce": asked["nonce"], "preferred_username": "mallory", "groups": ["cad"]}
     # Into a browser that began none, and into one that began another: nothing is asked of the provider.
-    assert back(fresh, asked).headers["location"] == "/login"
+    assert "not begun in this browser" in no_login(back(fresh, asked))
     begun(victim)
     refused = back(victim, asked)
     assert (refused.status_code, "not begun in this browser" in why(refused)) == (401, True)
     for given in ({"state": ""}, {"state": "ü"}, {"code": ""}, {"iss": "https://elsewhere.example"}, {"error": "<b>"}):
-        begun(victim)
         mine = begun(victim)
         assert back(victim, mine, **given).status_code == 401, given
-        assert LOGIN_COOKIE not in victim.cookies
+        assert "state" in given or login_cookie(mine) not in victim.cookies
     assert provider.asked == []
     assert access.COOKIE not in victim.cookies
     # One that answers as it should comes back once: the cookie of the login is gone.
     assert back(mallory, asked, iss=provider.issuer).status_code == 303
-    assert back(mallory, asked).headers["location"] == "/login"
+    assert "not begun in this browser" in no_login(back(mallory, asked))
 
 
 def test_a_code_that_was_used_is_refused(opened: Callable[..., Office], provider: Openid) -> None:
     office = opened()
     browser = office.behind_proxy(**OWN, Accept="text/html")
     asked = begun(browser)
-    kept = browser.cookies[LOGIN_COOKIE]
+    kept = browser.cookies[login_cookie(asked)]
     provider.claims = {"nonce": asked["nonce"], "preferred_username": "eve", "groups": ["cad"]}
     assert back(browser, asked).status_code == 303
     provider.status = 400
-    browser.cookies.set(LOGIN_COOKIE, kept)
+    browser.cookies.set(login_cookie(asked), kept)
     refused = back(browser, asked)
     assert (refused.status_code, why(refused)) == (401, "The provider did not let you in.")
 
@@ -264,16 +281,17 @@ def test_a_cookie_that_was_changed_or_is_old_begins_nothing(
     office = opened()
     browser = office.behind_proxy(**OWN, Accept="text/html")
     asked = begun(browser)
-    state, end, wanted, seal = browser.cookies[LOGIN_COOKIE].split(".")
+    named = login_cookie(asked)
+    state, end, wanted, seal = browser.cookies[named].split(".")
     elsewhere = urlsafe_b64encode(b"https://evil.example").decode().rstrip("=")
     for changed in (
         f"{state}.{end}.{elsewhere}.{seal}", f"{state}.{int(end) + 1}.{wanted}.{seal}", f"{state}.{end}.{wanted}.", "x",
         f"ü.{end}.{wanted}.{seal}",
     ):  # fmt: skip
-        answer = office.behind_proxy(**OWN, Cookie=f"{LOGIN_COOKIE}={changed}".encode()).get(
+        answer = office.behind_proxy(**OWN, Cookie=f"{named}={changed}".encode()).get(
             RETURN, params={"code": "c1", "state": asked["state"]}
         )
-        assert answer.headers["location"] == "/login", changed
+        assert "not begun in this browser" in no_login(answer), changed
     # Nor is the one cookie the other, and a session that was changed is none.
     logged_in(browser, provider, preferred_username="eve", groups=["cad"])
     who, end, seal = browser.cookies[access.COOKIE].split(".")
@@ -282,10 +300,12 @@ def test_a_cookie_that_was_changed_or_is_old_begins_nothing(
         other = office.behind_proxy(**OWN, Accept="text/html", Cookie=f"{access.COOKIE}={session}")
         assert other.get("/").status_code == 303
     late = time.time() + LOGIN_SECONDS + 1
-    asked = begun(browser)
+    asked = begun(browser, "/compare?study=a")
     with monkeypatch.context() as patch:
         patch.setattr(logins.time, "time", lambda: late)
-        assert back(browser, asked).headers["location"] == "/login"
+        answer = back(browser, asked)
+    assert "took longer than 10 minutes" in no_login(answer)
+    assert "/login/oidc?next=%2Fcompare%3Fstudy%3Da" in answer.text  # where it was to lead
     end_of_session = time.time() + access.SESSION_SECONDS + 1
     with monkeypatch.context() as patch:
         patch.setattr(access.time, "time", lambda: end_of_session)
@@ -341,6 +361,199 @@ def test_a_name_that_is_none_or_not_verified_is_refused(
     assert logged_in(browser, provider, groups=["it"], **claims).status_code == 401
 
 
+@pytest.fixture
+def believing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Users and tokens are read anew for each request."""
+    monkeypatch.setattr(access, "BELIEVED_SECONDS", 0.0)
+
+
+@pytest.fixture
+def waits(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Seconds for which failed attempts wait; none of them does."""
+    waited: list[float] = []
+
+    async def wait(self: Attempts, scope: object, place: str) -> None:
+        waited.append(0.0)
+
+    monkeypatch.setattr(Attempts, "failed", wait)
+    return waited
+
+
+@pytest.mark.usefixtures("believing")
+@pytest.mark.parametrize("again", [False, True])
+def test_removing_a_user_ends_the_sessions_for_good(
+    opened: Callable[..., Office], provider: Openid, again: bool
+) -> None:
+    office = opened()
+    browser, other = (office.behind_proxy(**OWN, Accept="text/html") for _ in range(2))
+    logged_in(browser, provider, preferred_username="dora", groups=["cad"])
+    with act_as(of_machine(Door.COMMAND)):
+        office.store.people.change_user("dora", removed=True)
+        office.store.people.change_user("dora", removed=False)
+    assert browser.get("/").status_code == 303
+    # Nor does it go on when another account is the user now, or the same one.
+    sub = "s1" if again else "s2"
+    assert logged_in(other, provider, sub=sub, preferred_username="dora", groups=["cad"]).status_code == 303
+    assert other.get("/").status_code == 200
+    assert browser.get("/").status_code == 303
+
+
+@pytest.mark.usefixtures("believing", "waits")
+def test_who_has_no_group_any_more_loses_role_and_sessions(opened: Callable[..., Office], provider: Openid) -> None:
+    office = opened()
+    first, second, stranger = (office.behind_proxy(**OWN, Accept="text/html") for _ in range(3))
+    logged_in(first, provider, preferred_username="dora", groups=["it"])
+    assert first.get("/me/users").status_code == 200
+    assert logged_in(second, provider, preferred_username="dora", groups=[]).status_code == 403
+    assert first.get("/me/users").status_code == 303
+    assert roles(office)["dora"] is Role.VIEWER
+    (row, *_) = office.store.audit.page(AuditFilter(action="user.change", actor="dora")).records
+    assert row.detail == {"sessions": "ended", "changes": {"role": ["administrator", "viewer"]}}
+    # Who only has the name of a user is not that user.
+    logged_in(first, provider, sub="s3", preferred_username="ada", groups=["it"])
+    assert logged_in(stranger, provider, sub="s4", preferred_username="ada", groups=[]).status_code == 403
+    assert first.get("/me/users").status_code == 200
+
+
+def roles(office: Office) -> dict[str, Role]:
+    """Roles by user."""
+    return {user.name: user.role for user in office.store.people.users()}
+
+
+@pytest.mark.usefixtures("believing", "waits")
+def test_the_last_administrator_keeps_the_role(
+    opened: Callable[..., Office], provider: Openid, caplog: pytest.LogCaptureFixture
+) -> None:
+    office = opened()
+    browser = office.behind_proxy(**OWN, Accept="text/html")
+    assert logged_in(browser, provider, preferred_username="ada", groups=["cad"]).status_code == 303
+    assert (browser.get("/me/users").status_code, roles(office)["ada"]) == (200, Role.ADMINISTRATOR)
+    (row,) = office.store.audit.page(AuditFilter(action="user.change")).records
+    assert (row.actor, row.detail) == ("ada", {"login": True, "kept": {"role": ["administrator", "designer"]}})
+    assert "is the last administrator" in caplog.text
+    assert logged_in(browser, provider, preferred_username="ada", groups=[]).status_code == 403
+    assert (browser.get("/me/users").status_code, roles(office)["ada"]) == (303, Role.ADMINISTRATOR)
+    with act_as(of_machine(Door.COMMAND)):
+        office.store.people.change_user("dora", Role.ADMINISTRATOR)
+    assert logged_in(browser, provider, preferred_username="ada", groups=["cad"]).status_code == 303
+    assert roles(office)["ada"] is Role.DESIGNER
+
+
+@pytest.mark.usefixtures("believing", "waits")
+def test_an_account_of_another_issuer_takes_the_user_as_at_a_first_login(
+    opened: Callable[..., Office], provider: Openid
+) -> None:
+    office = opened()
+    browser, other = (office.behind_proxy(**OWN, Accept="text/html") for _ in range(2))
+    before = Account("https://before.example", "0" * 64, "dora")
+    office.store.people.sign_in(before, Role.DESIGNER, create=False)
+    assert logged_in(browser, provider, preferred_username="dora", groups=["cad"]).status_code == 303
+    assert browser.get("/").status_code == 200
+    (row, *_) = office.store.audit.page(AuditFilter(action="user.change")).records
+    assert (row.actor, row.detail) == ("dora", {"login": True, "issuer": [before.issuer, provider.issuer]})
+    # The accounts of one issuer stay apart.
+    assert logged_in(other, provider, sub="s2", preferred_username="dora", groups=["cad"]).status_code == 403
+
+
+@pytest.mark.usefixtures("believing")
+def test_the_user_acts_at_a_login_whatever_the_name_at_the_provider(
+    opened: Callable[..., Office], provider: Openid
+) -> None:
+    office = opened()
+    browser = office.behind_proxy(**OWN, Accept="text/html")
+    logged_in(browser, provider, preferred_username="dora", groups=["cad"])
+    logged_in(browser, provider, preferred_username="ada", groups=["it"])
+    assert {row.actor for row in office.store.audit.page(AuditFilter(action="user.change", target="dora")).records} == {
+        "dora"
+    }
+
+
+def test_the_log_says_why_a_login_failed_and_counts_what_browsers_sent(
+    opened: Callable[..., Office], provider: Openid, waits: list[float], caplog: pytest.LogCaptureFixture
+) -> None:
+    browser = opened(oidc_create=False).behind_proxy(**OWN, Accept="text/html")
+    account = sha256(f"{provider.issuer}\ns1".encode()).hexdigest()[:12]
+    refused = logged_in(browser, provider, preferred_username="nobody", groups=["cad"])
+    assert (refused.status_code, waits) == (403, [])
+    assert f"'nobody' (account {account}) from 127.0.0.1: nobody is not a user of this service" in caplog.text
+    # An outage is no failed attempt, and the documented filter does not find it.
+    asked = begun(browser)
+    assert back(browser, asked, error="temporarily_unavailable").status_code == 503
+    provider.status = 500
+    assert (back(browser, begun(browser)).status_code, waits) == (503, [])
+    provider.status = 400
+    assert (back(browser, begun(browser)).status_code, len(waits)) == (401, 1)
+    provider.status, provider.error = 400, "invalid_client"
+    assert (back(browser, begun(browser)).status_code, len(waits)) == (503, 1)
+    provider.status = 200
+    assert logged_in(browser, provider, groups=["cad"]).status_code == 401
+    assert f"(account {account}) from 127.0.0.1: The provider did not say who you are" in caplog.text
+    assert "Failed login from" not in caplog.text  # which `Attempts.failed` says, that does nothing here
+
+
+def test_failed_logins_are_slowed(
+    opened: Callable[..., Office], provider: Openid, caplog: pytest.LogCaptureFixture
+) -> None:
+    office = opened()
+    waited: list[float] = []
+
+    async def sleep(seconds: float) -> None:
+        waited.append(seconds)
+
+    office.app.state.access.attempts = Attempts(sleep=sleep)
+    browser = office.behind_proxy(**OWN, Accept="text/html")
+    provider.status = 400
+    for _ in range(2):
+        assert back(browser, begun(browser)).status_code == 401
+    assert waited == [0.25, 0.5]
+    assert "Failed login from 127.0.0.1: page /login/oidc" in caplog.text
+
+
+def test_two_tabs_log_in_and_a_browser_keeps_few_logins(opened: Callable[..., Office], provider: Openid) -> None:
+    browser = opened().behind_proxy(**OWN, Accept="text/html")
+    first, second = begun(browser, "/compare"), begun(browser)
+    for asked, wanted in ((first, "/compare"), (second, "/")):
+        provider.claims = {"nonce": asked["nonce"], "preferred_username": "eve", "groups": ["cad"]}
+        assert back(browser, asked).headers["location"] == wanted
+    assert logins_of(browser) == []
+    for _ in range(8):
+        latest = begun(browser)
+    assert len(logins_of(browser)) == 5
+    assert login_cookie(latest) in browser.cookies
+
+
+def test_pages_of_other_sites_begin_no_login(opened: Callable[..., Office], provider: Openid) -> None:
+    office = opened()
+    for site, mode, dest, status in (
+        ("cross-site", "no-cors", "image", 403),
+        ("same-site", "cors", "empty", 403),
+        ("cross-site", "navigate", "iframe", 403),
+        ("cross-site", "navigate", "document", 303),
+        ("same-origin", "cors", "empty", 303),
+    ):
+        sent = {"Sec-Fetch-Site": site, "Sec-Fetch-Mode": mode, "Sec-Fetch-Dest": dest}
+        answer = office.behind_proxy(Accept="text/html", **sent).get("/login/oidc")
+        assert (answer.status_code, "set-cookie" in answer.headers) == (status, status == 303), sent
+
+
+def test_a_browser_at_another_address_is_led_to_the_public_one(opened: Callable[..., Office], provider: Openid) -> None:
+    browser = opened(public_url="http://127.0.0.1").behind_proxy(**OWN, Accept="text/html")
+    led = browser.get("/login/oidc", params={"next": "/compare"})
+    assert led.headers["location"] == "http://127.0.0.1/login/oidc?next=%2Fcompare&moved=true"
+    there = browser.get("/login/oidc", headers={"Host": "127.0.0.1:80"})
+    assert there.headers["location"].startswith(provider.issuer)
+
+
+@pytest.mark.parametrize("broken", [{"kty": "RSA", "n": "x"}, {"kty": "EC", "crv": "P-1", "x": "", "y": ""}, 7, None])
+def test_a_key_that_cannot_be_used_is_ignored(opened: Callable[..., Office], provider: Openid, broken: object) -> None:
+    browser = opened().behind_proxy(**OWN, Accept="text/html")
+    provider.keys = [broken, provider.known.as_dict(private=False)]
+    assert logged_in(browser, provider, preferred_username="eve", groups=["cad"]).status_code == 303
+    for keys in (None, [broken], "x"):
+        provider.keys = keys
+        assert logged_in(browser, provider, preferred_username="eve", groups=["cad"]).status_code == 503
+
+
 def test_a_form_that_was_refused_is_sent_after_the_login_in_another_tab(
     opened: Callable[..., Office], provider: Openid
 ) -> None:
@@ -389,10 +602,14 @@ def test_https_makes_the_cookies_secure_and_the_public_address_leads_back(
 ) -> None:
     office = opened(public_url="https://sprag.example", url_prefix="/sprag")
     browser = office.behind_proxy(**OWN, Accept="text/html", **{"X-Forwarded-Proto": "https"})
-    led = browser.get("/sprag/login/oidc")
+    # The cookie must be that of the public address; behind a proxy that replaces Host the login goes on.
+    led = browser.get("/sprag/login/oidc", params={"next": "/compare"})
+    assert led.headers["location"] == "https://sprag.example/sprag/login/oidc?next=%2Fcompare&moved=true"
+    assert "set-cookie" not in led.headers
+    led = browser.get("/sprag/login/oidc", params={"moved": "true"})
     assert parse_qs(urlsplit(led.headers["location"]).query)["redirect_uri"] == [f"https://sprag.example/sprag{RETURN}"]
     assert "; Secure" in led.headers["set-cookie"]
-    assert "Path=/sprag" in led.headers["set-cookie"]
+    assert "Path=/sprag/login/oidc;" in led.headers["set-cookie"]
 
 
 @pytest.mark.parametrize(

@@ -315,6 +315,14 @@ def test_a_quota_is_as_set_again(office: Office) -> None:
     assert person(office, "dora").quota == Quota(None, None, 5)
     (row,) = office.store.audit.page(AuditFilter(action="user.change", actor="ada")).records
     assert row.detail == {"changes": {"most_cases": [100, None], "most_bytes": [2**20, None], "most_checks": [3, 5]}}
+    with act_as(of_machine(Door.COMMAND)):
+        people.change_user("dora", quota=Quota(100))
+    contradiction = user("dora", "change", cases="5", **{"cases as set": "on"})
+    refused = ada.post("/me/users", data=contradiction, headers=OWN)
+    assert (refused.status_code, "give one of them" in refused.text) == (422, True)
+    assert person(office, "dora").quota.cases == 100
+    refused = ada.post("/me/users", data=user("dora", "hand-over", to="dora"), headers=OWN)
+    assert (refused.status_code, "is the user whose studies these are" in refused.text) == (422, True)
     shown = ada.get("/me/audit", params={"action": "user.change", "actor": "ada"}).text
     assert re.search(r'most cases: <span translate="no">100</span> → <span translate="no">as set</span>', shown)
 
