@@ -166,8 +166,12 @@ def remove(name: Known, db: Database = None) -> None:
 def restore(name: Known, db: Database = None) -> None:
     """Let a removed user in again, with the same tokens."""
     with users_of(db) as store:
-        record = store.people.change_user(user_of(store.people, name), removed=False)
-    _show(store, record, _("{name} is a user again: {role}", name=record.name, role=record.role))
+        known = user_of(store.people, name)
+        removed = any(user.name == known and user.removed_at is not None for user in store.people.users())
+        record = store.people.change_user(known, removed=False)
+    values = {"name": record.name, "role": record.role}
+    again = _("{name} is a user again: {role}", **values)
+    _show(store, record, again if removed else _("{name} is not removed, so nothing has changed: {role}", **values))
 
 
 @app.command("hand-over")

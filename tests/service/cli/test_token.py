@@ -154,6 +154,7 @@ def test_a_quota_is_as_set_again_and_tokens_have_a_limit(
     ):
         refused = sprag("admin", "user", *both, "--json", *db)
         assert (refused.code, [it["parameter"] for it in refused.failure["problems"]]) == (2, [option])
+    assert "dora is not removed" in sprag("admin", "user", "restore", "dora", *db).err
     monkeypatch.setenv("SPRAG_USER_TOKENS", "1")
     assert sprag("admin", "token", "create", "--name", "a", "--user", "dora", *db).code == 0
     refused = sprag("admin", "token", "create", "--name", "b", "--user", "dora", *db)
