@@ -61,9 +61,12 @@ def connection_options(server: str, token: str | None) -> dict[str, Any]:
     if secret and not _TOKEN.fullmatch(secret):  # the secret itself is in no message
         raise ValueError(N_("the token is not valid: it has only letters, digits and -._~+/ and may end with ="))
     headers = {"Authorization": f"Bearer {secret}"} if secret else {}
+    options = {"base_url": public(server), "headers": headers, "timeout": TIMEOUT}
     # A proxy from the environment is never used for this machine itself.
-    found = {"base_url": server, "headers": headers, "timeout": TIMEOUT, "trust_env": not is_loopback(url.host)}
-    return found | ({"verify": _trusted()} if url.scheme == "https" else {})
+    options |= {"trust_env": not is_loopback(url.host)}
+    if url.userinfo:  # not in the address, which logs and errors show
+        options["auth"] = (url.username, url.password)
+    return options | ({"verify": _trusted()} if url.scheme == "https" else {})
 
 
 def public(server: str) -> str:

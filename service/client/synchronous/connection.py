@@ -69,7 +69,7 @@ class Connection:
         transport: httpx.BaseTransport | None = None,
     ) -> None:
         chosen, secret = service_of(server, token)
-        self._http = httpx.Client(transport=transport, **connection_options(chosen.rstrip("/"), secret))
+        self._http = httpx.Client(transport=transport, **connection_options(chosen, secret))
         self.server = public(chosen)
         self.retry, self._timeout, self._open_to_all = retry, timeout, token == ""
         self._replaced = transport is not None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import copy
 import json
 import multiprocessing
@@ -260,7 +261,7 @@ def test_the_token_of_the_environment_does_not_go_to_the_service_of_the_login(
 def test_a_password_in_the_address_is_left_behind(kind: Any) -> None:
     client = kind("https://anna:very-secret@sprag.example:8443/office/")
     assert client.server == "https://sprag.example:8443/office"
-    assert client._http.base_url.password == "very-secret"
+    assert client._http.base_url == f"{client.server}/"
     content = pickle.dumps(client)
     assert b"very-secret" not in content
     assert b"anna" not in content
@@ -268,6 +269,10 @@ def test_a_password_in_the_address_is_left_behind(kind: Any) -> None:
     with pytest.raises(ValueError, match="is not") as refused:
         kind("ftp://anna:very-secret@sprag.example")
     assert "very-secret" not in str(refused.value)
+    sent: list[httpx.Headers] = []
+    transport = httpx.MockTransport(lambda request: sent.append(request.headers) or httpx.Response(200, json={}))
+    Client("http://anna:very%20secret@sprag.example", "", transport=transport).me()
+    assert sent[0]["authorization"] == f"Basic {base64.b64encode(b'anna:very secret').decode()}"
     bare = kind("http://sprag.example/a@b")
     assert bare.server == "http://sprag.example/a@b"
 
