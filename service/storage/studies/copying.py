@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import sqlalchemy as sa
 
+from sprag_study.service.storage.moving import TableOf
 from sprag_study.service.storage.part import row_of
 from sprag_study.service.storage.rows.case_keys import NOT_YET
 from sprag_study.service.storage.saved_views import SAVED_VIEWS
@@ -39,7 +40,18 @@ def copy_study(source: Session, target: Session, study_id: str) -> None:
 
 
 def _copy(reading: sa.Connection, writing: sa.Connection, table: sa.Table, which: sa.ColumnElement[bool]) -> None:
-    apart = {name: value for name, value in _APART.items() if name in table.c}
-    with reading.execute(sa.select(table).where(which), execution_options={"yield_per": _ROWS}) as rows:
-        for part in rows.mappings().partitions():
-            writing.execute(sa.insert(table), [{**row, **apart} for row in part])
+    """Copy those rows of a table, as the database has them."""
+    cells = [
+        sa.literal(_APART[column.name], column.type)
+        if column.name in _APART
+        else sa.type_coerce(column, _plain(column))
+        for column in table.c
+    ]
+    with reading.execute(sa.select(*cells).where(which), execution_options={"yield_per": _ROWS}) as rows:
+        for part in rows.partitions():
+            TableOf(table).put(writing, list(map(tuple, part)), replace=False)
+
+
+def _plain(column: sa.Column[Any]) -> sa.types.TypeEngine[Any]:
+    """The type of a column as the database has it."""
+    return sa.String() if isinstance(column.type, sa.Enum) else column.type
