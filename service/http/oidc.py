@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import hmac
 import logging
+import re
 import secrets
 import time
 from base64 import urlsafe_b64decode, urlsafe_b64encode
@@ -39,6 +40,7 @@ _LOG = logging.getLogger("sprag.access")
 #: Each login that has begun has its cookie, so that several tabs can log in: this, and the beginning of the state.
 LOGIN_COOKIE: Final = "sprag_login_"
 _STATE_IN_NAME: Final = 12
+_NAME: Final = re.compile(f"{LOGIN_COOKIE}[A-Za-z0-9_-]{{{_STATE_IN_NAME}}}")
 #: Most logins that a browser keeps; the oldest ones go.
 _MOST_LOGINS: Final = 5
 #: Seconds in which somebody can log in at the provider.
@@ -111,14 +113,14 @@ def surplus(cookies: Mapping[str, str], sealed: Callable[[str], str]) -> list[st
     """Names of the cookies that go when another login begins: forged ones, and the oldest ones."""
     latest = sorted(_logins(cookies, sealed), key=lambda login: login.end, reverse=True)
     kept = {login.cookie for login in latest[: _MOST_LOGINS - 1]}
-    return [name for name in cookies if name.startswith(LOGIN_COOKIE) and name not in kept]
+    return [name for name in cookies if _NAME.fullmatch(name) and name not in kept]
 
 
 def _logins(cookies: Mapping[str, str], sealed: Callable[[str], str]) -> Iterator[Login]:
     """Every login in the cookies."""
     for name, value in cookies.items():
         text, dot, seal = value.rpartition(".")
-        if not name.startswith(LOGIN_COOKIE) or not dot:
+        if not _NAME.fullmatch(name) or not dot:
             continue
         if hmac.compare_digest(seal.encode("utf-8", "replace"), sealed(f"login {text}").encode()):
             state, end, wanted = text.split(".")

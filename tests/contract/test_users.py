@@ -322,7 +322,7 @@ def test_only_a_removed_user_is_restored_which_forgets_the_account(store: Store)
         ("user.add", {"role": "designer"}),
         ("user.change", {"login": True}),
         ("user.remove", {}),
-        ("user.restore", {"account": "forgotten"}),
+        ("user.restore", {"account_forgotten": True}),
         ("user.change", {"login": True}),
     ]
 

@@ -45,6 +45,21 @@ _A = AUDIT_LOG.c
 #: Rows read at a time for a file of the whole log.
 _BLOCK: Final = 1000
 _LONGEST: Final = 200
+#: Names of what else is to be known of a change, in words; those that other pages have are in the catalogue already.
+WORDS: Final = (
+    N_("most cases"),
+    N_("most bytes"),
+    N_("most checks"),
+    N_("login"),
+    N_("instead of"),
+    N_("account forgotten"),
+    N_("sessions ended"),
+    N_("role kept"),
+    N_("role of groups"),
+    N_("issuer"),
+    N_("query"),
+    N_("place"),
+)
 #: Longest text of a change, such as notes.
 _LONGEST_VALUE: Final = 500
 TIME_ALLOWED: Final = N_("a date or time such as 2027-01-31 or 2027-01-31T06:00+01:00; without an offset it is UTC")

@@ -33,7 +33,7 @@ from sprag_study.service.storage.schedules.tables import SCHEDULES
 from sprag_study.service.storage.tables import ENDED, HELD_AT_DEADLINE, STUDIES
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping
+    from collections.abc import Collection, Iterable, Mapping
     from datetime import datetime, timedelta
 
     from sprag_study.service.settings import Settings
@@ -215,7 +215,7 @@ class People(Part):
                 raise parameter_error("role", "conflict", N_("is that of the last administrator"), name)
             detail = _changes(old, row)
             if moved and not removed and old.subject is not None:
-                detail["account"] = "forgotten"
+                detail["account_forgotten"] = True
             if moved or detail:
                 action = "user.change" if not moved else "user.remove" if removed else "user.restore"
                 note(connection, self._now(), action, name, **detail)
@@ -247,8 +247,6 @@ class People(Part):
                 raise FaultError("not-allowed", Sentence(recorded.OTHER_ACCOUNT, user=row.name))
             salt = {"session_salt": _salt()} if first else {}  # sessions of another account end
             after, detail = _changed_by_login(connection, row, role, **link, **salt)
-            if first and row.issuer is not None:
-                detail["issuer"] = [row.issuer, account.issuer]
             if first or detail:
                 _note_login(connection, now, "user.change", row.name, **({"login": True} if first else {}), **detail)
             return _user_record(after)
@@ -262,7 +260,7 @@ class People(Part):
             row = _of_account(connection, account)
             if row is not None and row.removed_at is None:
                 _, detail = _changed_by_login(connection, row, Role.VIEWER, session_salt=_salt())
-                _note_login(connection, self._now(), "user.change", row.name, sessions="ended", **detail)
+                _note_login(connection, self._now(), "user.change", row.name, sessions_ended=True, **detail)
 
     def hand_over(self, name: str, heir: str) -> tuple[int, int]:
         """Give the studies, schedules, components and views of a user to another; returns the numbers of the first two.
@@ -458,9 +456,10 @@ def _changed_by_login(
     after = connection.execute(sa.update(USERS).where(mine).values(role=given, **values).returning(USERS)).one()
     if row.role == Role.ADMINISTRATOR.value and not _is_administered(connection):
         after = connection.execute(sa.update(USERS).where(mine).values(role=row.role).returning(USERS)).one()
-        detail = {"kept": {"role": [row.role, given]}}
+        detail = {"role_kept": row.role, "role_of_groups": given}
         _LOG.warning("%r is the last administrator and stays one; the groups of the login give: %s.", row.name, given)
-    return after, {**detail, **_changes(row, after)}
+    names = ("role", "issuer") if row.issuer is not None else ("role",)
+    return after, {**detail, **_changes(row, after, names)}
 
 
 def _note_login(connection: sa.Connection, now: int, action: str, name: str, **detail: Any) -> None:
@@ -547,9 +546,8 @@ def _set(quota: Quota | None) -> dict[str, int]:
     return {name: value for name, value in _columns(quota or Quota()).items() if value is not None}
 
 
-def _changes(old: Any, new: Any) -> dict[str, Any]:
-    """What differs in a row of a user, before and after, for the log; a quota that is None is as set."""
-    names = ("role", *_columns(Quota()))
+def _changes(old: Any, new: Any, names: Iterable[str] = ("role", *_columns(Quota()))) -> dict[str, Any]:
+    """What differs of these columns of a user, before and after, for the log; a quota that is None is as set."""
     return differences(*({name: getattr(row, name) for name in names} for row in (old, new)))
 
 

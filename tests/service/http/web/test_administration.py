@@ -325,6 +325,9 @@ def test_a_quota_is_as_set_again(office: Office) -> None:
     assert (refused.status_code, "is the user whose studies these are" in refused.text) == (422, True)
     shown = ada.get("/me/audit", params={"action": "user.change", "actor": "ada"}).text
     assert re.search(r'most cases: <span translate="no">100</span> → <span translate="no">as set</span>', shown)
+    headers = {"Accept-Language": "uk"}
+    shown = ada.get("/me/audit", params={"action": "user.change", "actor": "ada"}, headers=headers).text
+    assert "найбільше випадків: " in shown
 
 
 def test_a_user_has_a_limited_number_of_tokens(
