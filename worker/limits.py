@@ -108,7 +108,7 @@ MAX_WAITING_STUDIES: Final = 1_000
 #: Streams of events that are open at once, and those of one user or token, where tokens are needed.
 MAX_STREAMS: Final = 200
 MAX_STREAMS_EACH: Final = 100
-#: Simultaneous connections; a further one is answered with 503.
+#: Simultaneous connections; a further one takes the place of one that waits for the rest of its request.
 MAX_CONNECTIONS: Final = 800
 #: Size of the head of a request, which the parser of HTTP would limit to 16 KiB, and of the address in it: that of a
 #: new study can describe its machine.

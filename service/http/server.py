@@ -11,9 +11,8 @@ import time
 from collections import deque
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import partial
 from types import FrameType
-from typing import Any, Protocol
+from typing import Protocol
 
 import psutil
 import uvicorn
@@ -27,7 +26,6 @@ from sprag_study.service.jobs.dispatching import start_dispatcher_process, worke
 from sprag_study.service.jobs.settings_log import note_settings
 from sprag_study.service.settings import Settings
 from sprag_study.worker import traces
-from sprag_study.worker.limits import MAX_CONNECTIONS
 
 _LOG = logging.getLogger("sprag.service")
 
@@ -171,24 +169,31 @@ class Ending:
         self._ending = ending
         self._timers = (threading.Timer(_GRACE_SECONDS, cut), threading.Timer(last_seconds, give_up))
 
-    def watch_signals(self) -> None:
-        """Notice the signals that the server handles; in the main thread only."""
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, partial(self._begin, signal.getsignal(number)))
-
-    def _begin(self, handler: Any, number: int, frame: FrameType | None) -> None:
+    def begin(self) -> None:
+        """Begin the shutdown, unless it has begun."""
         if not self._ending.is_set():
             self._ending.set()
             for timer in self._timers:
                 timer.daemon = True
                 timer.start()
-        if callable(handler):
-            handler(number, frame)
 
     def ended(self) -> None:
         """Everything has ended in time."""
         for timer in self._timers:
             timer.cancel()
+
+
+class Server(uvicorn.Server):
+    """uvicorn's server; a signal that it gets, also while it starts, begins the shutdown."""
+
+    def __init__(self, config: uvicorn.Config, ending: Ending) -> None:
+        super().__init__(config)
+        self._ending = ending
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """A signal requests the end."""
+        self._ending.begin()
+        super().handle_exit(sig, frame)
 
 
 def _give_up() -> None:
@@ -227,8 +232,6 @@ def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) 
         """Called as soon as the service listens, and every `LOOK_SECONDS` from then on."""
         nonlocal failure
         if supervisor.ident is None and failure is None:
-            if threading.current_thread() is threading.main_thread():
-                ending.watch_signals()
             try:
                 (announce or _say)(address)
             except OSError as error:  # nobody reads where it says its address
@@ -239,7 +242,7 @@ def serve(settings: Settings, *, announce: Callable[[str], None] | None = None) 
             certificate.renew(config.ssl)
 
     config = _config(app, certificate, look)
-    server = uvicorn.Server(config)
+    server = Server(config, ending)
     note_settings(context.store, context.origins)
     with listener, _outlived_signals():
         try:
@@ -262,7 +265,6 @@ def _config(app: FastAPI, certificate: Certificate | None, look: Callable[[], Aw
         access_log=False,
         **READING,
         ws="none",
-        limit_concurrency=MAX_CONNECTIONS,
         server_header=False,
         proxy_headers=False,
         timeout_graceful_shutdown=int(_GRACE_SECONDS) + _ANSWER_SECONDS,

@@ -13,13 +13,12 @@ from typing import TYPE_CHECKING, Any, Final
 from starlette.datastructures import Headers
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from sprag_study.worker.limits import HEAD_SECONDS, MAX_HEAD_BYTES, WRITE_SECONDS
+from sprag_study.worker.limits import HEAD_SECONDS, MAX_CONNECTIONS, MAX_HEAD_BYTES, WRITE_SECONDS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from starlette.types import ASGIApp, Message, Receive, Scope, Send
-    from uvicorn import Config
 
 #: The open connections by both of their ends, as the scope of a request has them.
 _OPEN: Final[dict[tuple[Any, Any], TimeoutProtocol]] = {}
@@ -28,16 +27,17 @@ _OPEN: Final[dict[tuple[Any, Any], TimeoutProtocol]] = {}
 class TimeoutProtocol(H11Protocol):
     """HTTP/1.1 with header and write timeouts. The guard limits the time for the body of a request.
 
-    ``head_seconds`` are allowed from the first byte of a connection or request to the end of its head,
-    ``write_seconds`` between two reads of the client from a long answer, however much it reads.
+    ``head_seconds`` are allowed from the beginning of a connection, or the end of an answer, to the end of the next
+    head, ``write_seconds`` between two reads of the client from a long answer, however much it reads. Beyond
+    ``most_connections`` of a server, a new one takes the place of one that waits for its request.
     """
 
     head_seconds = HEAD_SECONDS
     write_seconds = WRITE_SECONDS
+    most_connections = MAX_CONNECTIONS
 
-    def __init__(self, config: Config, *others: Any, **options: Any) -> None:
-        super().__init__(config, *others, **options)
-        self._most = config.limit_concurrency
+    def __init__(self, *others: Any, **options: Any) -> None:
+        super().__init__(*others, **options)
         self._ends: tuple[Any, Any] = (None, None)
         self._head: asyncio.TimerHandle | None = None
         self._write: asyncio.TimerHandle | None = None
@@ -60,6 +60,9 @@ class TimeoutProtocol(H11Protocol):
             yield
         finally:
             self._requests, self._since = self._requests - 1, self._clock.time()
+            # Part of the next head may have come before the application returned.
+            if not self._requests and _OPEN.get(self._ends) is self:
+                self._await_head()
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """A client connects; wait for its request."""
@@ -73,21 +76,15 @@ class TimeoutProtocol(H11Protocol):
 
     def _make_room(self) -> None:
         """Close the connection that has waited longest for a whole request, where all places are taken."""
-        if self._most is None or len(_OPEN) < self._most:
+        if len(_OPEN) <= self.most_connections:
             return
         here = [other for (server, _), other in _OPEN.items() if server == self._ends[0]]
-        if len(here) < self._most:
+        if len(here) <= self.most_connections:
             return
         others = (other for other in here if other.waiting and other is not self)
         oldest = min(others, key=lambda other: other._since, default=None)
         if oldest is not None:
             oldest._abort()
-
-    def data_received(self, data: bytes) -> None:
-        """Part of a request arrives."""
-        super().data_received(data)
-        if not self._requests and self._head is None:
-            self._await_head()
 
     def pause_writing(self) -> None:
         """The client stops reading."""
@@ -111,7 +108,14 @@ class TimeoutProtocol(H11Protocol):
         self._connection.abort()
 
     def _await_head(self) -> None:
-        self._head = self._clock.call_later(self.head_seconds, self._abort)
+        self._head = self._clock.call_later(self.head_seconds, self._end_head)
+
+    def _end_head(self) -> None:
+        """Disconnect a client whose next head is not complete, unless it still reads the answer before it."""
+        if self._connection.get_write_buffer_size():
+            self._await_head()
+        else:
+            self._abort()
 
     def _await_read(self) -> None:
         _stopped(self._write)
@@ -161,5 +165,11 @@ def _stopped(timer: asyncio.TimerHandle | None) -> asyncio.TimerHandle | None:
     return None
 
 
+#: Connections that uvicorn counts beyond `MAX_CONNECTIONS`: over TLS it learns late that one has been closed.
+CLOSING: Final = 64
 #: How uvicorn reads requests.
-READING: Final[dict[str, Any]] = {"http": TimeoutProtocol, "h11_max_incomplete_event_size": MAX_HEAD_BYTES}
+READING: Final[dict[str, Any]] = {
+    "http": TimeoutProtocol,
+    "h11_max_incomplete_event_size": MAX_HEAD_BYTES,
+    "limit_concurrency": MAX_CONNECTIONS + CLOSING,
+}

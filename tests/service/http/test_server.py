@@ -6,18 +6,21 @@ import asyncio
 import os
 import signal
 import threading
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import httpx
 import pytest
+import uvicorn
 
 from sprag_study.service.http import app
-from sprag_study.service.http.server import AddressError, Ending, Supervisor, serve
+from sprag_study.service.http.server import AddressError, Ending, Server, Supervisor, serve
 from sprag_study.service.storage.errors import DatabaseError
 from sprag_study.worker.pool.child_pool import JobStoppedError
 from tests.worker.fakes import HandClock
 
 if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable
+
     from sprag_study.service.http.computer import ProcessComputer
     from sprag_study.service.settings import Settings
     from tests.service.conftest import Service
@@ -202,16 +205,40 @@ def test_a_second_signal_reaches_the_server_and_the_grace_ends_once(monkeypatch:
         for number in before:
             signal.signal(number, lambda number, _frame: seen.append(number))
         shutdown = Ending(ending, cut, lambda: seen.append(0), last_seconds=600.0)
-        shutdown.watch_signals()
-        signal.raise_signal(signal.SIGTERM)
-        signal.raise_signal(signal.SIGINT)
+        server = Server(uvicorn.Config(lambda: None, log_config=None), shutdown)
+        with server.capture_signals():
+            signal.raise_signal(signal.SIGTERM)
+            assert (server.should_exit, server.force_exit) == (True, False)
+            signal.raise_signal(signal.SIGINT)
+            assert server.force_exit
         assert ending.is_set()
         assert over.wait(600)
         shutdown.ended()
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-    assert (cuts, seen) == ([1], [signal.SIGTERM, signal.SIGINT])
+    assert (cuts, sorted(seen)) == ([1], [signal.SIGINT, signal.SIGTERM])  # the server passes them on at its end
+
+
+def test_a_signal_during_the_start_begins_the_shutdown() -> None:
+    ending, seen = threading.Event(), []
+
+    async def starting(_scope: object, receive: Callable[[], Awaitable[object]], send: Any) -> None:
+        await receive()
+        signal.raise_signal(signal.SIGTERM)
+        assert ending.is_set()
+        await send({"type": "lifespan.startup.complete"})
+        await receive()
+        await send({"type": "lifespan.shutdown.complete"})
+
+    before = signal.signal(signal.SIGTERM, lambda number, _frame: seen.append(number))
+    shutdown = Ending(ending, lambda: None, lambda: None, last_seconds=600.0)
+    try:
+        Server(uvicorn.Config(starting, port=0, lifespan="on", log_config=None), shutdown).run()
+    finally:
+        shutdown.ended()
+        signal.signal(signal.SIGTERM, before)
+    assert seen == [signal.SIGTERM]
 
 
 def test_a_supervisor_that_never_started_can_be_stopped() -> None:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import socket
+import ssl
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -15,12 +18,13 @@ import uvicorn
 from uvicorn.server import ServerState
 
 from sprag_study.service.http import guard
-from sprag_study.service.http.timeouts import READING, TimeoutProtocol
+from sprag_study.service.http.timeouts import CLOSING, READING, Answering, TimeoutProtocol
 from sprag_study.service.jobs.submission import accept
 from sprag_study.service.spec.document import parse_spec
 from sprag_study.worker import limits
 from sprag_study.worker.limits import MAX_STREAMS
 from tests.service.conftest import API, Service
+from tests.service.http.test_tls import make
 
 #: Far less than a person waits, far more than a request takes.
 SHORT = 0.3
@@ -202,9 +206,14 @@ def test_the_queue_has_an_end(service: Service, monkeypatch: pytest.MonkeyPatch,
     assert limits.MAX_WAITING_STUDIES >= 100
 
 
+class Few(TimeoutProtocol):
+    """Places for as many connections as a test opens."""
+
+    most_connections = 4
+
+
 def test_half_a_request_makes_room_for_a_whole_one(service: Service) -> None:
-    options = {**READING, "limit_concurrency": 4}
-    with serving(service.app, **options) as address, ExitStack() as opened:
+    with serving(service.app, http=Few, limit_concurrency=4 + CLOSING) as address, ExitStack() as opened:
         head = b"GET /livez HTTP/1.1\r\nHost: local"
         body = b"POST /api/v1/studies:preview HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
         half = [head, body + b"Content-Length: 100\r\n\r\n{", head, head, b""]
@@ -216,3 +225,59 @@ def test_half_a_request_makes_room_for_a_whole_one(service: Service) -> None:
         for _ in range(3):
             assert httpx.get(f"http://{address[0]}:{address[1]}/livez").status_code == 200
         assert until_closed(held[0]) == until_closed(held[1]) == b"", "those that have waited longest"
+
+
+def test_idle_connections_make_room_over_tls_too(service: Service, tmp_path: Path) -> None:
+    """There the server learns late that a connection has been closed."""
+    file, key = make(tmp_path)
+    trust = ssl.create_default_context(cafile=str(file))
+    options = {"ssl_certfile": file, "ssl_keyfile": key, "limit_concurrency": 4 + CLOSING}
+    with serving(service.app, http=Few, **options) as address, ExitStack() as opened:
+        for _ in range(8):
+            plain = opened.enter_context(socket.create_connection(address))
+            opened.enter_context(trust.wrap_socket(plain, server_hostname="localhost"))
+        url = f"https://localhost:{address[1]}/livez"
+        assert [httpx.get(url, verify=trust, timeout=600).status_code for _ in range(5)] == [200] * 5
+
+
+def test_a_head_that_begins_before_the_application_returns_is_not_waited_for() -> None:
+    begun, come = asyncio.Event(), []
+
+    class Watched(Hasty):
+        def data_received(self, data: bytes) -> None:
+            super().data_received(data)
+            come.append(data)
+            if len(come) > 1:
+                begun.set()
+
+    async def lingering(_scope: Any, _receive: Any, send: Any) -> None:
+        await send({"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"2")]})
+        await send({"type": "http.response.body", "body": b"ok"})
+        await begun.wait()
+
+    with serving(Answering(lingering), http=Watched) as address, socket.create_connection(address) as connection:
+        connection.sendall(HEAD + b"\r\n")
+        connection.settimeout(600)
+        received = b""
+        while not received.endswith(b"ok"):
+            received += connection.recv(65536)
+        connection.sendall(HEAD)
+        connection.settimeout(30.0)
+        assert connection.recv(1) == b""
+
+
+def test_a_long_answer_that_is_still_read_is_not_cut_by_the_wait_for_the_next_head() -> None:
+    size = 20_000_000
+
+    async def long(_scope: Any, _receive: Any, send: Any) -> None:
+        head = [(b"content-length", str(size).encode())]
+        await send({"type": "http.response.start", "status": 200, "headers": head})
+        await send({"type": "http.response.body", "body": bytes(size)})
+
+    class Patient(Hasty):
+        write_seconds = 600.0
+
+    with serving(Answering(long), http=Patient) as address, socket.create_connection(address) as connection:
+        connection.sendall(HEAD + b"Connection: close\r\n\r\n")
+        time.sleep(3.0 * SHORT)
+        assert len(until_closed(connection)) > size
