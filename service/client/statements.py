@@ -124,7 +124,10 @@ def selected(statement: str, rows: Mapping[str, bytes], polars: bool) -> pd.Data
     answer = with_plain_numbers(answer)
     if polars:
         return from_arrow(answer)
-    frame: pd.DataFrame = answer.to_pandas()
+    try:
+        frame: pd.DataFrame = answer.to_pandas()
+    except (ValueError, NotImplementedError) as error:  # such as a date beyond those of Python
+        raise StatementError(f"a pandas table cannot have what is selected: {error}") from error
     shown = zip(frame.columns, names, strict=True)
     frame.attrs["units"] = {column: units[name] for column, name in shown if name in units}
     return frame

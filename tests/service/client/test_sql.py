@@ -160,6 +160,11 @@ def test_types_that_tables_do_not_have_are_refused(rows: dict[str, bytes], state
         selected(statement, rows, polars)
 
 
+def test_a_date_that_python_does_not_have_is_refused(rows: dict[str, bytes]) -> None:
+    with pytest.raises(sprag.StatementError, match="year 50000 is out of range"):
+        selected("select date '50000-01-01' as d", rows, False)
+
+
 def test_no_setting_is_named_where_memory_is_short(rows: dict[str, bytes], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(statements._CLOSED, "memory_limit", "10MB")
     with pytest.raises(sprag.StatementError, match="fewer columns or cases") as refused:
