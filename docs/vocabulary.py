@@ -36,9 +36,9 @@ _SWINGING = ("pendulums.0.angle", "pendulums.1.angle", "shaft.angle")
 #: Fields of the details of the audit log.
 LOGGED: Final = (
     "after", "before", "cases", "catch_up", "cron", "deadline", "enabled", "endings", "expires", "fields", "fresh",
-    "in_report", "kind", "name", "note", "notes", "now", "overlap", "owner", "page", "priority", "problem", "reason",
-    "report_email", "report_webhook", "report_when", "role", "rows", "schedules", "spec", "studies", "study", "tags",
-    "to", "window", "zone",
+    "in_report", "kind", "most_bytes", "most_cases", "most_checks", "name", "note", "notes", "now", "overlap",
+    "owner", "page", "priority", "problem", "reason", "report_email", "report_webhook", "report_when", "role", "rows",
+    "schedules", "spec", "studies", "study", "tags", "to", "window", "zone",
 )  # fmt: skip
 
 

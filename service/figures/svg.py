@@ -182,7 +182,7 @@ class _Painting(Painting):
         columns = self._columns()
         # Names stand at curves where they find a place, so panels come before the legend above them.
         rows = [self._row(row, columns) for row in range(figure.rows)]
-        self._legend({name for row in rows for names in row.named for name in names})
+        self._legend(_named_throughout(rows))
         for place, row in enumerate(rows):
             self._add(row, last=place == len(rows) - 1, columns=columns)
         entries = list(mark_entries(figure, self._patterns))
@@ -350,7 +350,7 @@ class _Painting(Painting):
         return replace(line, colour=colour_beside(line.key, line.colour, self._chosen), wide=line.wide or own)
 
     def _legend(self, named: AbstractSet[str]) -> None:
-        """The legend of the lines that all panels have: what stands at no curve; ``named`` are those that do."""
+        """The legend of the lines that all panels have: all but the ``named``, which stand at their curves."""
         figure = self._figure
         own = (figure.motion or figure.apart) and not figure.family
         unnamed = (line for line in figure.listed if line.heading or not (line.joined and line.name in named))
@@ -376,6 +376,18 @@ class _Row:
     named: list[set[str]]
     titles: list[tuple[list[str], Rows]]
     head: float
+
+
+def _named_throughout(rows: Sequence[_Row]) -> set[str]:
+    """The names that stand at their curve in every panel that draws it: a reader needs them nowhere else."""
+    panels = [(placed.panel, names) for row in rows for (placed, _), names in zip(row.placed, row.named, strict=True)]
+    without = {
+        line.name
+        for panel, names in panels
+        for line in panel.lines
+        if line.name not in names and bool((np.isfinite(line.x) & np.isfinite(line.y)).any())
+    }
+    return {name for _, names in panels for name in names} - without
 
 
 def _scaled(figure: Figure) -> bool:

@@ -28,8 +28,9 @@ if TYPE_CHECKING:
 def image(report: Report, figure: Figure, caption: str) -> Image:
     """A described figure in the reader's units, the curve that is meant in ink."""
     read = read_figure(figure, report.reading)
-    if read.held and read.studies == 1:  # in the text, which has room for it on a phone too
-        caption = f"{caption}. {'; '.join(read.held)}"
+    if read.studies == 1:  # in the text, which has room for it on a phone too
+        held = "; ".join(text for text in read.held if text not in caption)
+        caption = f"{caption}. {held}" if held else caption
     chosen = "" if report.curve is None else str(report.curve)
     return image_of(
         partial(_figure, read, label=caption, chosen=chosen), WIDE if read.columns == 1 else DOUBLE, caption

@@ -19,6 +19,7 @@ from sprag_study.service.http.routers import page_router
 from sprag_study.service.http.schedule_views import listed as all_schedules
 from sprag_study.service.http.streams import event_stream
 from sprag_study.service.http.threads import Threads, in_thread
+from sprag_study.service.http.web.deployment import backups_listed, is_being_backed_up
 from sprag_study.service.http.web.study_list import listed
 from sprag_study.service.jobs.nights import HOURS, MOST_HOURS, night
 from sprag_study.service.jobs.workers import worker_list
@@ -46,7 +47,13 @@ def _nights(context: Context, given: QueryParams) -> Any:
 
 
 def _workers(context: Context, _: QueryParams) -> Any:
-    return worker_list(context.store.dispatchers)
+    """What the page of workers shows; a heartbeat counts only to the minute, as the page shows it."""
+    store = context.store
+    dispatchers = worker_list(store.dispatchers)["dispatchers"]
+    workers = [{**item, "heartbeat_at": item["heartbeat_at"][:_MINUTE]} for item in dispatchers]
+    backups = [name for _, name, _ in backups_listed(context.settings.backup_folder)]
+    alerts = [alert.kind for alert in store.alerts.present()]
+    return [workers, all_schedules(store), backups, is_being_backed_up(), alerts]
 
 
 #: What is listed, by the name of its stream.
@@ -56,6 +63,8 @@ _LISTS: Final[dict[str, Callable[[Context, QueryParams], Any]]] = {
     "workers": _workers,
 }
 
+#: Length of a time stamp to the minute.
+_MINUTE: Final = len("2026-11-27T21:29")
 #: Time in which each look at a list of studies finds more of their answers.
 _SECONDS: Final = 0.5
 

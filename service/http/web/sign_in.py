@@ -35,6 +35,7 @@ from sprag_study.service.http.web.way_in import (
     access_of,
     is_secure,
     login_page,
+    origin,
     with_session,
     within,
 )
@@ -75,7 +76,7 @@ async def sign_in(context: Ctx, request: Request, next: str = "/", moved: bool =
         raise ApiError("cross-site", "Pages of other sites cannot begin a login here.")
     login = begin(within(next))
     back = _back(context, request)
-    if not moved and _host(urlsplit(back).netloc) != _host(request.headers["host"]):
+    if not moved and _host(urlsplit(back).netloc) != _host(urlsplit(origin(request)).netloc):
         query = urlencode({"next": login.wanted, "moved": "true"})
         return RedirectResponse(f"{back.removesuffix(RETURN_PATH)}{OIDC_PATH}?{query}", 303, _NOT_KEPT)
     try:
@@ -200,5 +201,4 @@ def _back(context: Context, request: Request) -> str:
     public = context.settings.reports.public_url if context.settings.public_url else ""
     if public:
         return public + RETURN_PATH
-    scheme = "https" if is_secure(request) else "http"
-    return f"{scheme}://{request.headers['host']}{here(RETURN_PATH)}"
+    return f"{origin(request)}{here(RETURN_PATH)}"

@@ -51,6 +51,12 @@ def is_secure(request: Request) -> bool:
     return request.url.scheme == "https" or (trusted and forwarded == "https")
 
 
+def origin(request: Request) -> str:
+    """Scheme, host and port of the service as the browser uses it."""
+    scheme = "https" if is_secure(request) else "http"
+    return f"{scheme}://{request.headers.get('host', request.url.netloc)}"
+
+
 async def with_session(answer: Response, request: Request, grant: Grant) -> Response:
     """An answer that begins a session of ``grant`` in the browser; raises StoreError."""
     session = await access_of(request).log_in(grant)

@@ -170,3 +170,12 @@ def test_curves_are_named_as_far_as_names_fit_and_a_legend_has_the_others() -> N
     assert at_curves == ["rising"]
     assert text.count(">rising<") == 1, "not in the legend too"
     assert ">A study whose name" in text
+
+
+def test_a_legend_has_a_name_that_one_of_the_panels_has_no_place_for() -> None:
+    x = np.linspace(0.0, 1.0, 20)
+    apart = [Line(name, x, slope * x, PALETTE[0], key=name) for name, slope in (("low", 1.0), ("high", 2.0))]
+    together = [replace(line, y=x * (1.0 + 1e-4 * place), listed=False) for place, line in enumerate(apart)]
+    panels = [Panel(Quantity(name, "1"), tuple(lines)) for name, lines in (("y", apart), ("z", together))]
+    assert svg(Figure(Quantity("x", "1"), tuple(panels[:1]))).count(">low<") == 1
+    assert svg(Figure(Quantity("x", "1"), tuple(panels))).count(">low<") == 2

@@ -176,6 +176,12 @@ def test_the_cookie_is_secure_behind_tls(office: Office) -> None:
     assert "Secure" in browser.post("/login", data={"token": office.write}).headers["set-cookie"]
 
 
+def test_the_form_shows_the_address_that_the_browser_uses(office: Office) -> None:
+    for proxy, scheme in (({}, "http"), ({"X-Forwarded-Proto": "https"}, "https")):
+        browser = office.browser(**OWN, **proxy, Authorization=f"Bearer {office.write}")
+        assert set(re.findall("(https?)://[^/]*/api/v1/studies", browser.get("/new").text)) == {scheme}
+
+
 def test_a_session_does_not_serve_other_sites(office: Office) -> None:
     browser = office.browser()
     browser.post("/login", data={"token": office.write}, headers=OWN)

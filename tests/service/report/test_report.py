@@ -22,7 +22,7 @@ from sprag_study.service.report import Office, write_report
 from sprag_study.service.report.blocks import Document, Image, Section, Table, Text
 from sprag_study.service.report.content import AS_TYPED, Report, ranges
 from sprag_study.service.report.document import document_of, report_of
-from sprag_study.service.report.drawn import drawing_images
+from sprag_study.service.report.drawn import drawing_images, image
 from sprag_study.service.report.pdf import pdf_report
 from sprag_study.service.spec.document import load_spec
 from sprag_study.service.storage.errors import DatabaseError
@@ -204,6 +204,16 @@ def test_the_machine_with_its_values_and_its_clutch_are_drawn(service: Service) 
     assert b"var(" not in drawing.svg
     arm = report.reading.quantity(report.study.base["pendulums.0.arm"], "m")
     assert arm in drawing.svg.decode()
+
+
+def test_a_caption_says_what_is_held_once(service: Service) -> None:
+    study_id = service.submit()
+    service.fill(study_id)
+    report = report_of(Library(service.store), study_id)
+    assert report.clutch is not None
+    figure = replace(report.clutch, held=("Load = 2 N·m",))
+    assert image(report, figure, "Speed").caption == "Speed. Load = 2 N·m"
+    assert image(report, figure, "Speed; Load = 2 N·m").caption == "Speed; Load = 2 N·m"
 
 
 def test_doubtful_cases_are_in_no_range(service: Service, monkeypatch: pytest.MonkeyPatch) -> None:

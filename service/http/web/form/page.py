@@ -59,6 +59,7 @@ from sprag_study.service.http.web.form.tolerances import BATCH, OWN, distributio
 from sprag_study.service.http.web.form.undo import history_of, remember, undo
 from sprag_study.service.http.web.form.values import Form
 from sprag_study.service.http.web.templates import fragment, page, spec_text
+from sprag_study.service.http.web.way_in import origin
 from sprag_study.service.http.work import Attended, Work
 from sprag_study.service.jobs.submission import Submission, take_in
 from sprag_study.service.presets import preset_names
@@ -272,7 +273,7 @@ async def check(context: Ctx, work: Attended, request: Request, values: Form) ->
             "faults": checked.faults,
             "beside": checked.beside,
             "run": checked.run,
-            "panel": fragment("_form_panel.html", checked=checked, address=_address(request)),
+            "panel": fragment("_form_panel.html", checked=checked, address=origin(request)),
             "pictures": [] if sheet is None else sheet.pictures,
             "spans": {} if sheet is None else sheet.spans,
             "fits": {
@@ -329,7 +330,7 @@ def sheet_form(request: Request, values: Values, checked: Checked | None, opened
         "faults": checked.faults,
         "checked": checked,
         "begun": begun,
-        "address": _address(request),
+        "address": origin(request),
         "key": values.get("key") or secrets.token_hex(8),
         "model": model,
         "standard": model == FORM_MODEL,
@@ -467,8 +468,3 @@ def _kept(values: Values) -> Values:
         name: text for name, text in values.items()
         if name.startswith(others) or (name.startswith(f"{BASE}/") and name not in shown)
     }  # fmt: skip
-
-
-def _address(request: Request) -> str:
-    """The address of the service as the browser used it."""
-    return f"{request.url.scheme}://{request.headers.get('host', request.url.netloc)}"

@@ -103,6 +103,17 @@ def test_the_page_says_how_schedules_fare(service: Service) -> None:
     assert "Runs of the last 7 days" in text
 
 
+def test_the_page_of_the_log_shows_a_setting_by_its_name_and_an_empty_value(service: Service) -> None:
+    given = Settings().model_copy(update={"backup_folder": "/srv/backups"})
+    note_settings(service.store, [setting for setting in effective(given) if setting.name == "backup_folder"])
+    page = service.http.get("/me/audit", params={"action": "settings.change", "language": "en"}).text
+    assert "<td>service<br>" in page
+    assert (
+        '<code translate="no">backup_folder</code>: <span translate="no">empty</span> → '
+        '<span translate="no">/srv/backups</span>'
+    ) in page
+
+
 def test_settings_that_changed_since_the_last_start_are_in_the_log(service: Service) -> None:
     store = service.store
 

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING
 import pytest
 from playwright.sync_api import expect
 from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import QueryParams
 
 from benchmarks.faults.harness import free_port
 from sprag_study.service.http import looks as looking
+from sprag_study.service.http.web import live
 from tests.acceptance.processes import SECONDS
 from tests.service.conftest import in_process
 from tests.service.timed_spec import SPEC
@@ -53,6 +55,27 @@ def test_a_stream_has_one_event_for_each_change(service: Service, monkeypatch: p
     ending.clear()
     again = service.http.get(f"/live/{name}", headers={"Last-Event-ID": marks[-1]})
     assert "id: " not in again.text  # it has changed no more
+
+
+def test_a_heartbeat_is_no_change_of_the_workers_but_a_backup_is(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    context = service.app.state.context
+    service.store.work.take_over("somebody")
+    beats = itertools.count(10)
+    listed = live.worker_list(service.store.dispatchers)
+
+    def beating(_: object) -> object:
+        stamp = f"2026-11-27T21:29:{next(beats)}Z"
+        return {**listed, "dispatchers": [{**item, "heartbeat_at": stamp} for item in listed["dispatchers"]]}
+
+    monkeypatch.setattr(live, "worker_list", beating)
+    before = live._workers(context, QueryParams())
+    assert live._workers(context, QueryParams()) == before
+    monkeypatch.setattr(live, "is_being_backed_up", lambda: True)
+    assert live._workers(context, QueryParams()) != before
+    page = service.http.get("/me/workers").text
+    assert set(re.findall(r'id="(\w+)" data-live', page)) == {"alerts", "workers", "schedules", "backups"}
 
 
 def test_only_lists_have_streams(service: Service) -> None:
