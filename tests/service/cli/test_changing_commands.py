@@ -40,8 +40,8 @@ CHANGING = {
 }
 #: Commands that read, and those that name their actors themselves.
 OTHERS = {
-    **{f"show {name}": "as `show curves`" for name in ("front", "map", "ribbon", "sensitivity", "yield")},
-    "check": "reads which rows can be reused",
+    **{f"show {name}": "as `show curves`" for name in ("front", "map", "ribbon", "sensitivity", "sql", "yield")},
+    **dict.fromkeys(("check", "show state"), "reads which rows can be reused"),
     "serve": "its requests, schedules and nightly work act by themselves",
     "admin worker": "the same without requests; cases are no changes of a person",
     "admin doctor": "reads",
