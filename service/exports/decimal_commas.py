@@ -5,12 +5,9 @@ from __future__ import annotations
 import codecs
 import re
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from sprag_study.service.exports.text import DECIMAL_NUMBER
-
-if TYPE_CHECKING:
-    pass
 
 #: A cell, and what ends it. What looks like a number and is a text has quotes (`sprag_study.service.exports.text`).
 _CELL: Final = re.compile(r'("(?:[^"]|"")*"|[^",\n]*)(,|\n)')

@@ -78,8 +78,6 @@ def _combined(study: Study) -> str:
     return _("every combination") if study.combine == "grid" else _("side by side")
 
 
-#: Digits of inputs.
-_DIGITS: Final = 8
 #: How the path of a formula begins among what was given.
 _DERIVED: Final = "derive."
 _ORIGINS: Final = {
