@@ -75,10 +75,16 @@ def _columns(cases: Any, argument: str) -> tuple[dict[str, Any], Mapping[str, st
 
 
 def _filled(column: Any) -> Any:
-    """A column with an empty text in place of None and NaN."""
+    """A column with an empty text in place of None, NaN and the NA of pandas."""
     if isinstance(column, str) or not isinstance(column, Iterable):
         return column
-    return ["" if cell is None or cell != cell else cell for cell in column]  # noqa: PLR0124 - NaN
+    return ["" if _missing(cell) else cell for cell in column]
+
+
+def _missing(cell: Any) -> bool:
+    """Whether a cell has no value; what NA is compared with is NA, which is neither true nor false."""
+    unequal = cell != cell  # noqa: PLR0124 - NaN
+    return cell is None or unequal is cell or bool(unequal)
 
 
 def _cells(column: Any, argument: str, name: str) -> Any:

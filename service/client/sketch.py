@@ -35,7 +35,9 @@ class Picture:
 
     @property
     def svg(self) -> bytes:
-        """The content of a picture as SVG."""
+        """The content of an SVG; AttributeError where the picture is a PNG or a PDF, which is in ``content``."""
+        if self.form != "svg":
+            raise AttributeError(f"the picture is a {self.form.upper()}: its bytes are `content`")
         return self.content
 
     def _repr_svg_(self) -> str | None:

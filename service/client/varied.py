@@ -46,8 +46,8 @@ def _points(text: str, path: str) -> str:
     made = io.StringIO()
     # A comma with a blank behind it stands between numbers with decimal commas.
     sign = ";" if table.separator == ", " else table.separator or ","
-    if len(kept) == 1 and sign == ";":  # a single column has no semicolon that says it
-        made.write("sep=;\n")
+    if sign != ",":  # a single column has no sign that says it, and a bar is never looked for
+        made.write(f"sep={sign}\n")
     csv.writer(made, delimiter=sign, lineterminator="\n").writerows([r.cells[k] for k in kept] for r in table.rows)
     return made.getvalue()
 

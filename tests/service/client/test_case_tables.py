@@ -55,6 +55,20 @@ def test_tables_of_every_library_are_cases(cases: Any, text: str) -> None:
 
 
 @pytest.mark.parametrize(
+    "measured",
+    [
+        pd.DataFrame({LOAD: LOADS, FREQUENCY: [None, 25.5]}),
+        pd.DataFrame({LOAD: LOADS, FREQUENCY: [None, 25.5]}).convert_dtypes(),
+        pd.DataFrame({LOAD: LOADS, FREQUENCY: pd.array([pd.NA, 25.5], dtype="Float64")}),
+        {LOAD: LOADS, FREQUENCY: [pd.NA, 25.5]},
+    ],
+    ids=["NaN", "converted", "NA of a column", "NA of a list"],
+)
+def test_a_cell_without_a_value_was_not_measured(measured: Any) -> None:
+    assert points_of(measured, "measured", gaps=True) == f"{LOAD},{FREQUENCY}\n0.0,\n0.25,25.5\n"
+
+
+@pytest.mark.parametrize(
     ("cases", "message"),
     [
         (pd.DataFrame({LOAD: [0.1, None]}), r"cases\['shaft.load'\].*a number, or a text with a unit, in every row"),

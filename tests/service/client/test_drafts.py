@@ -116,6 +116,11 @@ def test_what_is_held_leaves_points_samples_and_groups() -> None:
     (held_points,) = commas.hold(load=0.1)["axes"]
     assert held_points == {"points": "sep=;\nexcitation.frequency\n20,25\n21,5\n"}
     assert cases(commas.hold(load=0.1)) == 2
+    for begin, sign, cells in (("", "\t", "20,25"), ("sep=|\n", "|", "20.25"), ("sep=|\n", "|", "20,25")):
+        text = f"{begin}shaft.load{sign}excitation.frequency\n0.5{sign}{cells}\n"
+        left = sprag.Drive.of({**base, "axes": [{"points": text}]}).hold(load=0.1)
+        assert left["axes"] == [{"points": f"sep={sign}\nexcitation.frequency\n{cells}\n"}]
+        assert cases(left) == 1
     ranges = [{"path": path, "from": 0.1, "to": 0.2} for path in ("shaft.load", "excitation.amplitude_y")]
     sample = {"sample": "sobol", "count": 4, "ranges": ranges}
     group = {"combine": "zip", "axes": [sample]}

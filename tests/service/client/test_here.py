@@ -20,6 +20,7 @@ from anyio.from_thread import BlockingPortal
 
 import sprag_study as sprag
 from sprag_study.service.client import Client, RefusedError, Study
+from sprag_study.service.client.sketch import Picture
 from sprag_study.service.settings import Settings
 from tests.service.calibrating import calibration
 from tests.service.client.conftest import OfService
@@ -207,6 +208,9 @@ def test_what_a_study_gives_is_printed_in_short(run: sprag.Study) -> None:
     picture = run.plot(LOAD, SPEED)
     assert picture._repr_svg_().lstrip().startswith(("<?xml", "<svg"))
     assert repr(picture) == f"Picture(SVG, {len(picture.svg):,} bytes)"
+    png = Picture(b"\x89PNG", "png")
+    with pytest.raises(AttributeError, match="the picture is a PNG: its bytes are `content`"):
+        _ = png.svg
 
 
 def test_any_view_can_be_a_picture(run: sprag.Study, tmp_path: Path) -> None:
