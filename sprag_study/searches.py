@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -140,8 +140,6 @@ class Search:
         exact : bool
             Designs must meet equalities to 1e-6 to be feasible, instead of within their bands.
         """
-        if not self._told:
-            return self._framed(self._step.points[:0])
         plan, rows = self._plan, self._ranked_rows()
         ranked = front(plan, rows, equality=MET if exact else None)
         table = self._framed(rows.points[:: plan.cases_each])
@@ -156,6 +154,9 @@ class Search:
         """The rows of all rounds but that which only gives the derivatives of the polish."""
         derivatives = self._phases.index("polish") if "polish" in self._phases else None
         rounds = [rows for number, rows in enumerate(self._told) if number != derivatives]
+        if not rounds:
+            nothing = np.empty(0)
+            return Rows(self._step.points[:0], nothing.astype(np.bool_), dict.fromkeys(self.values, nothing))
         names = [name for name in rounds[0].values if all(name in rows.values for rows in rounds)]
         return Rows(
             np.concatenate([rows.points for rows in rounds]),
@@ -217,7 +218,7 @@ class Search:
         """Which rows count: of a table of Sprag those of its usable results, otherwise all."""
         if "ending" not in columns or "flags" not in columns:
             return np.ones(len(self._step.points), dtype=np.bool_)
-        return models.usable(self._model, list(columns["ending"]), [",".join(flags) for flags in columns["flags"]])
+        return models.usable(self._model, list(columns["ending"]), [_flags_text(cell) for cell in columns["flags"]])
 
 
 def search(spec: Spec | str | PathLike[str]) -> Search:
@@ -261,6 +262,13 @@ def _resumed(spec: Mapping[str, Any], told: list[Rows]) -> Search:
     for rows in told:
         resumed._take(rows)
     return resumed
+
+
+def _flags_text(cell: Any) -> str:
+    """The flags of a row joined by commas: of a list, or of a cell of a CSV file, which is NaN where there are none."""
+    if isinstance(cell, str):
+        return cell.replace(";", ",")
+    return ",".join(cell) if isinstance(cell, Iterable) else ""
 
 
 def _results_in(goal: Mapping[str, Any]) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -11,6 +12,7 @@ import pandas as pd
 import pytest
 
 import sprag_study as sprag
+from sprag_study.worker import models
 from tests.service.timed_spec import SPEC
 
 FREQUENCY, ARM = "excitation.frequency", "pendulums.0.arm"
@@ -64,6 +66,40 @@ def test_an_objective_of_the_script() -> None:
     assert (len(search.ask()), list(search)) == (0, [])
     with pytest.raises(ValueError, match="has ended"):
         search.tell([])
+
+
+@pytest.mark.parametrize(
+    ("best", "columns"),
+    [({"cost": "min"}, ["cost"]), ({"efficiency": "max", "cost": "min"}, ["efficiency", "cost"]), ([], [])],
+)
+def test_before_anything_is_told_the_best_designs_are_an_empty_table(best: Any, columns: list[str]) -> None:
+    goal = {"population": 8, "generations": 2, "subject_to": ["mass <= 3"]}
+    search = sprag.search(drive().goal(vary=VARY, best=best, **goal))
+    table = search.best(3)
+    assert list(table) == [FREQUENCY, ARM, *columns, "feasible", "violation", "rank"]
+    assert (len(table), search.best(exact=True).shape) == (0, table.shape)
+    assert table.attrs["units"] == {FREQUENCY: "Hz", ARM: "m", **dict.fromkeys(columns, "1")}
+
+
+@pytest.mark.parametrize("flags", [None, np.nan, pd.NA, "", [], "creep;large", ["creep", "large"]])
+def test_flags_of_a_file_are_those_of_a_table(flags: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    read: list[str] = []
+    usable = models.usable
+
+    def reading(model: str, endings: list[str], texts: list[str]) -> Any:
+        read.extend(texts)
+        return usable(model, endings, texts)
+
+    monkeypatch.setattr(models, "usable", reading)
+    searched().tell({"cost": [1.0] * 8, "ending": ["ok"] * 8, "flags": [flags] * 8})
+    assert read == ["creep,large" if isinstance(flags, str | list) and flags else ""] * 8
+
+
+def test_designs_are_told_by_the_rows_of_a_file(tmp_path: Path) -> None:
+    search = searched(generations=2)
+    file = search.run(processes=0).export(tmp_path / "rows.csv")
+    search.tell(pd.read_csv(file), cost=[1.0] * 8)
+    assert len(search.best()) == 8
 
 
 def test_goals_and_limits_of_both_kinds() -> None:
