@@ -32,9 +32,14 @@ def service_of(server: str | None, token: str | None) -> tuple[str, str | None]:
     if token is not None:
         return chosen, token
     of_login = _place(chosen) == _place(kept.get("server", ""))
-    of_environment = not of_login or _place(chosen) == _place(named)
-    secret = os.environ.get("SPRAG_TOKEN") if of_environment else None
+    secret = os.environ.get("SPRAG_TOKEN") if takes_variable(chosen) else None
     return chosen, secret or (kept.get("token", "") if of_login else None)
+
+
+def takes_variable(address: str) -> bool:
+    """Whether ``SPRAG_TOKEN`` is for the service at an address: not of a login, unless ``SPRAG_SERVER`` names it."""
+    place = _place(address)
+    return place != _place(profile().get("server", "")) or place == _place(os.environ.get("SPRAG_SERVER", ""))
 
 
 def _place(address: str) -> tuple[object, ...]:

@@ -212,6 +212,21 @@ def confirmed(question: str) -> bool:
             return given in yes
 
 
+def agreed(question: str, *, yes: bool, needed: str | None = None) -> bool:
+    """Whether a command goes on with what it asks about: with --yes, or where somebody at the terminal says yes.
+
+    Where nobody can be asked it goes on, unless ``needed`` says what --yes is needed for there: results are deleted
+    only on a word, and access is taken away in any case. WrongInputError then.
+    """
+    if yes:
+        return True
+    if sys.stdin.isatty():
+        return confirmed(question)
+    if needed is not None:
+        raise wrong_option("--yes", "required", N_("is needed where nobody can be asked"), detail=needed)
+    return True
+
+
 def console() -> Console:
     """The console of standard output: colours on a terminal only."""
     from rich.console import Console

@@ -36,7 +36,8 @@ from sprag_study.service.cli.options import (
 )
 from sprag_study.service.cli.sources import SpecOrStudy, is_study, refuse_local
 from sprag_study.service.faults import Fault, Kind
-from sprag_study.service.languages import _, earlier
+from sprag_study.service.languages import N_, _, earlier
+from sprag_study.service.login import takes_variable
 from sprag_study.worker.limits import MAX_BODY_BYTES, MAX_PRIORITY
 
 if TYPE_CHECKING:
@@ -105,13 +106,12 @@ def refusal(error: RefusedError) -> CommandFailureError:
     """The failure of the command for a refusal of the service."""
     kind = cast("Kind", error.code)
     if error.status == 401:
-        return TroubleError(
-            kind,
-            _(
-                "{refusal} Give the service's token with --token or in SPRAG_TOKEN, or keep it with `sprag login`.",
-                refusal=earlier.said(_(error.detail)),
-            ),
+        advice = (
+            N_("{refusal} Give the service's token with --token or in SPRAG_TOKEN, or keep it with `sprag login`.")
+            if takes_variable(address()[0])
+            else N_("{refusal} Give the service's token with --token, or log in again with `sprag login`.")
         )
+        return TroubleError(kind, _(advice, refusal=earlier.said(_(error.detail))))
     if error.status in (403, 421) or error.status >= 500:
         return TroubleError(kind, error.detail)
     faults = [

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
 from sprag_study.service.cli import completion, extend
 from sprag_study.service.cli.common import wants_json
-from sprag_study.service.cli.console import confirmed, say, write_json, wrong_option
+from sprag_study.service.cli.console import agreed, say, write_json, wrong_option
 from sprag_study.service.cli.described import listing, option, parameter, query_of, signed
 from sprag_study.service.cli.following import exit_as, follow, further, outlived, show_study, submitted
 from sprag_study.service.cli.groups import Groups
@@ -150,13 +149,10 @@ def delete(
             name=study["name"] or study["model"],
             cases=study["progress"]["done"],
         )
-        if not yes:
-            if not sys.stdin.isatty():
-                detail = _("delete {what}?", what=described)
-                raise wrong_option("--yes", "required", N_("is needed where nobody can be asked"), detail=detail)
-            if not confirmed(_("Delete {what} with all its results?", what=described)):
-                say(_("nothing is deleted"))
-                return
+        question = _("Delete {what} with all its results?", what=described)
+        if not agreed(question, yes=yes, needed=_("delete {what}?", what=described)):
+            say(_("nothing is deleted"))
+            return
         client.delete(study_path(study["id"]), [("at_once", "true")] if at_once else ())
     if wants_json():
         write_json({"deleted": study["id"]})

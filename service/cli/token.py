@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import secrets
-import sys
 from datetime import UTC, timedelta
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -12,7 +11,7 @@ import typer
 from sprag_study.service.cli import completion
 from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.configured import read_settings
-from sprag_study.service.cli.console import WrongInputError, confirmed, say, show_table, write_json
+from sprag_study.service.cli.console import WrongInputError, agreed, say, show_table, write_json
 from sprag_study.service.cli.groups import Groups
 from sprag_study.service.cli.names import token_of, user_of
 from sprag_study.service.cli.options import Database
@@ -126,11 +125,7 @@ def revoke(
     with users_of(db) as store:
         known = token_of(store.people, token_id)
         name = next((record.name for record in store.people.tokens() if record.id == known), known)
-        if (
-            not yes
-            and sys.stdin.isatty()
-            and not confirmed(_("Revoke the token {name} ({token})?", name=name, token=known))
-        ):
+        if not agreed(_("Revoke the token {name} ({token})?", name=name, token=known), yes=yes):
             say(_("nothing is revoked"))
             return
         try:

@@ -290,7 +290,7 @@ def test_a_study_is_kept_where_the_answer_is_no(
 ) -> None:
     study = submit(service, spec, "Feeder")
     monkeypatch.setattr("sys.stdin.isatty", lambda: True)
-    monkeypatch.setattr("sprag_study.service.cli.study.confirmed", lambda _question: False)
+    monkeypatch.setattr("sprag_study.service.cli.console.confirmed", lambda _question: False)
     assert execute(["study", "delete", study, "--server", "http://localhost"]) == 0
     assert "nothing is deleted" in capsys.readouterr().err
     assert service.http.get(f"{API}/studies/{study}").status_code == 200

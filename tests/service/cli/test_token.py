@@ -138,6 +138,10 @@ def test_revoking_is_asked_about_at_a_terminal(
         monkeypatch.setattr("sys.stdin", Terminal(""))
         assert execute(["admin", "token", "revoke", record.id, "--yes", "--db", settings.database]) == 0
         assert all(token.revoked_at is not None for token in store.people.tokens())
+        store.people.create_token("laptop 3", TokenScope.READ)
+        monkeypatch.setattr("sys.stdin", io.StringIO())
+        assert execute(["admin", "token", "revoke", "laptop 3", "--db", settings.database]) == 0, "a script goes on"
+        assert all(token.revoked_at is not None for token in store.people.tokens())
 
 
 def test_a_quota_is_as_set_again_and_tokens_have_a_limit(

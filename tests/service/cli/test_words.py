@@ -18,7 +18,8 @@ from sprag_study.service.cli import common, components, doctor
 from sprag_study.service.cli.app import command_line
 from sprag_study.service.cli.groups import common_first
 from sprag_study.service.cli.old_words import OLD, forwarded
-from sprag_study.service.client import Client
+from sprag_study.service.cli.remote import refusal
+from sprag_study.service.client import Client, RefusedError
 from sprag_study.service.login import DEFAULT_SERVER
 from sprag_study.service.login import profile_file as login_file
 from sprag_study.service.storage.people.scopes import TokenScope
@@ -219,8 +220,13 @@ def test_the_secret_of_this_machine_is_not_sent_to_the_service_of_a_login(
     for kept, sent in (({}, ""), ({"token": "kept"}, "kept")):
         login.write_text(json.dumps({"server": "http://far.example", **kept}))
         assert common.address() == ("http://far.example", sent)
+    refused = RefusedError(401, {"detail": "This request carries no valid token."})
+    advice = refusal(refused).detail
+    assert "SPRAG_TOKEN" not in advice
+    assert "log in again with `sprag login`" in advice
     monkeypatch.setenv("SPRAG_SERVER", "http://near.example")
     assert common.address() == ("http://near.example", "a-secret-of-this-machine")
+    assert "SPRAG_TOKEN" in refusal(refused).detail
     with Client("http://far.example", "") as client:
         assert "authorization" not in client._http.headers
 
