@@ -55,6 +55,10 @@ def test_both_lead_to_the_service_and_do_not_compress() -> None:
     assert values(CADDY, "encode") == []
 
 
+def test_nginx_speaks_http_2_as_caddy_does_by_itself() -> None:
+    assert values(NGINX, "http2") == ["on"]
+
+
 def test_nginx_passes_streams_on_as_they_come() -> None:
     (location,) = re.findall(r"location ~ (\S+) \{[^}]*proxy_buffering off;", NGINX)
     study = "/api/v1/studies/st_0123456789abcdef"
