@@ -13,7 +13,7 @@ from sprag_study.service.actor import acting
 from sprag_study.service.spec.components import Component
 from sprag_study.service.storage.errors import ComponentNotFoundError, TooManyComponentsError
 from sprag_study.service.storage.part import Part, moment
-from sprag_study.service.storage.people.audit import edition_of, note, require_edition, require_owner
+from sprag_study.service.storage.people.audit import differences, edition_of, note, require_edition, require_owner
 from sprag_study.service.storage.people.pools import pool_of
 from sprag_study.service.storage.tables import METADATA
 from sprag_study.worker.limits import MAX_COMPONENTS
@@ -81,7 +81,7 @@ class Components(Part):
 
     def _put(self, connection: sa.Connection, one: Component) -> ComponentRecord:
         same = (_C.kind == one.kind, _C.name == one.name)
-        old = connection.execute(sa.select(_C.id, _C.owner).where(*same).with_for_update()).one_or_none()
+        old = connection.execute(sa.select(COMPONENTS).where(*same).with_for_update()).one_or_none()
         values: dict[str, Any] = {
             "note": one.note,
             "fields": json.dumps(dict(one.fields), ensure_ascii=False),
@@ -95,7 +95,8 @@ class Components(Part):
             change = sa.update(COMPONENTS).where(*same).values(values)
         row = connection.execute(change.returning(COMPONENTS)).one()
         action = "component.add" if old is None else "component.change"
-        note(connection, self._now(), action, row.id, kind=one.kind, name=one.name, fields=dict(one.fields))
+        changes = {} if old is None else differences(*_numbers_and_note(old, row))
+        note(connection, self._now(), action, row.id, kind=one.kind, name=one.name, fields=dict(one.fields), **changes)
         return _record(row)
 
     def remove(self, component_id: str, read: Collection[str] | None = None) -> None:
@@ -111,6 +112,14 @@ class Components(Part):
             require_edition("component", row.id, _record(row).etag, read)
             connection.execute(sa.delete(COMPONENTS).where(_C.id == component_id))
             note(connection, self._now(), "component.remove", row.id, kind=row.kind, name=row.name)
+
+
+def _numbers_and_note(old: Any, new: Any) -> list[dict[str, Any]]:
+    """The fields and the note of two rows of a component, None for a field that one of them lacks."""
+    fields = [json.loads(row.fields) for row in (old, new)]
+    names = sorted({*fields[0], *fields[1]})
+    rows = zip((old, new), fields, strict=True)
+    return [{"note": row.note, **{name: numbers.get(name) for name in names}} for row, numbers in rows]
 
 
 def _record(row: Any) -> ComponentRecord:

@@ -107,7 +107,7 @@ class Views(Part):
         with self.session.write() as connection:
             study = None if view.study is None else row_of(connection, view.study, STUDIES.c.number).number
             same = (_V.page == view.page, _V.name == view.name, _V.study == study if study else _V.study.is_(None))
-            old = connection.execute(sa.select(_V.id, _V.owner).where(*same)).first()
+            old = connection.execute(sa.select(_V.id, _V.owner, _V.query).where(*same)).first()
             if old is None:
                 # Figures of reports have a limit for each study, and studies of schedules inherit them.
                 pool = pool_of(connection, SAVED_VIEWS, _V.place.is_(None), MAX_VIEWS)
@@ -121,7 +121,9 @@ class Views(Part):
                 require_owner("view", identity, old.owner)
                 connection.execute(sa.update(SAVED_VIEWS).where(_V.id == identity).values(self._content(view.query)))
             row = _row_of(connection, identity)
-            detail = {"page": view.page, "name": view.name, "study": view.study}
+            detail: dict[str, Any] = {"page": view.page, "name": view.name, "study": view.study}
+            if old is not None:
+                detail |= differences({"query": old.query}, {"query": view.query})
             note(connection, self._now(), "view.save", identity, **detail, in_report=view.in_report)
             self._put_in_report(connection, row, wanted=view.in_report or row.place is not None, place=row.place)
             return _record(_row_of(connection, identity))

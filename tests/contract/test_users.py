@@ -359,6 +359,11 @@ def test_the_log_has_the_values_before_and_after(store: Store) -> None:
     store.studies.change(made.id, StudyChange(name="b", notes="n" * 600, tags=("x",)))
     view = store.views.save(View("studies", "mine", "owner=dora"))
     store.views.change(view.id, ViewChange(name="ours", query="owner=emil"))
+    store.views.save(View("studies", "ours", "owner=ada"))
+    for fields in ({"spring_rate": "9 N/mm"}, {"spring_rate": "8 N/mm", "mass": "1 kg"}):
+        store.components.put([Component("spring", "F-120", "", fields)])
     log = {row.action: row.detail.get("changes") for row in store.audit.rows(AuditFilter())}
+    assert log["component.change"] == {"spring_rate": ["9 N/mm", "8 N/mm"], "mass": [None, "1 kg"]}
+    assert log["view.save"] == {"query": ["owner=emil", "owner=ada"]}
     assert log["study.change"] == {"name": [made.name, "b"], "notes": ["", "n" * 500 + "…"], "tags": [[], ["x"]]}
     assert log["view.change"] == {"name": ["mine", "ours"], "query": ["owner=dora", "owner=emil"]}

@@ -187,8 +187,8 @@ class People(Part):
 
         A number of ``quota`` that is None is kept, but where ``as_set`` names it (cases, bytes, checks): then the
         settings have it again; both at once raise FaultError. Tokens of a removed user are worth nothing until the user
-        is restored, which forgets the account at the OpenID provider; sessions end for good. Nothing is done to
-        remove a removed user, or to restore an active one. On pages the last administrator stays: raises FaultError.
+        is restored, which forgets the account at the OpenID provider; sessions from there end. A removed user is
+        not removed again, nor an active one restored. On pages the last administrator stays: raises FaultError.
         """
         given = {column: value for column, value in _columns(quota or Quota()).items() if value is not None}
         both = [number for number in as_set if f"most_{number}" in given]

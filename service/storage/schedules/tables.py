@@ -16,6 +16,7 @@ from sprag_study.service.schedules.policies import CatchUp, Overlap, Policies
 from sprag_study.service.schedules.report_to import ReportTo, ReportWhen
 from sprag_study.service.schedules.times import Timing, Window, read_time_of_day
 from sprag_study.service.storage.part import micros_of, optional_moment
+from sprag_study.service.storage.people.audit import differences
 from sprag_study.service.storage.tables import METADATA
 
 if TYPE_CHECKING:
@@ -201,7 +202,7 @@ def logged_fields(fields: ScheduleFields) -> dict[str, Any]:
 def logged_changes(old: ScheduleFields, new: ScheduleFields) -> dict[str, list[Any]]:
     """The fields that differ, before and after; of a spec and of the path of a webhook only that they changed."""
     before, after = logged_fields(old), logged_fields(new)
-    changes = {name: [before[name], after[name]] for name in after if before[name] != after[name]}
+    changes: dict[str, list[Any]] = differences(before, after).get("changes", {})
     if old.report_to.webhook != new.report_to.webhook and "report_webhook" not in changes:
         origin = after["report_webhook"]
         changes["report_webhook"] = [f"{origin}, old path", f"{origin}, new path"]

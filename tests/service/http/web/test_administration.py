@@ -18,6 +18,7 @@ from sprag_study.service.actor import Door, Role, act_as, of_machine
 from sprag_study.service.delivery import origin_of
 from sprag_study.service.faults import FaultError
 from sprag_study.service.http.access import Access
+from sprag_study.service.spec.components import Component
 from sprag_study.service.storage.errors import StoreError, TokenNotFoundError
 from sprag_study.service.storage.people.audit import AuditFilter
 from sprag_study.service.storage.people.people import Quota, UserRecord
@@ -328,6 +329,16 @@ def test_a_quota_is_as_set_again(office: Office) -> None:
     headers = {"Accept-Language": "uk"}
     shown = ada.get("/me/audit", params={"action": "user.change", "actor": "ada"}, headers=headers).text
     assert "найбільше випадків: " in shown
+
+
+def test_the_log_shows_the_fields_of_a_component_and_what_changed_of_them(office: Office) -> None:
+    for rate in ("9 N/mm", "8 N/mm"):
+        with act_as(of_machine(Door.COMMAND)):
+            office.store.components.put([Component("spring", "F-120", "", {"spring_rate": rate})])
+    shown = office.program("ada").get("/me/audit", params={"action": "component.add"}).text
+    assert 'spring rate: <span translate="no">9 N/mm</span></td>' in shown
+    shown = office.program("ada").get("/me/audit", params={"action": "component.change"}).text
+    assert 'spring rate: <span translate="no">9 N/mm</span> → <span translate="no">8 N/mm</span></td>' in shown
 
 
 def test_a_user_has_a_limited_number_of_tokens(
