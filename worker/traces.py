@@ -40,6 +40,8 @@ SCHEDULE: Final = "sprag.schedule.id"
 FUNCTION: Final = "code.function.name"
 
 _ENDPOINTS: Final = ("OTEL_EXPORTER_OTLP_TRACES_ENDPOINT", "OTEL_EXPORTER_OTLP_ENDPOINT")
+#: Values of OTEL_TRACES_EXPORTER, which has several with commas between them.
+_OTLP, _NONE = "otlp", "none"
 #: Milliseconds after which a process that computes sends its spans: it may be killed at any time.
 _SOON: Final = 1_000
 #: The field of a carrier that W3C Trace Context names.
@@ -53,13 +55,25 @@ def wanted() -> bool:
     """Whether the environment asks for traces."""
     if os.environ.get("OTEL_SDK_DISABLED", "").lower() == "true":
         return False
-    exporter = os.environ.get("OTEL_TRACES_EXPORTER", "").lower()
-    return exporter == "otlp" if exporter else any(os.environ.get(name) for name in _ENDPOINTS)
+    exporters = _exporters()
+    return _OTLP in exporters if exporters else any(os.environ.get(name) for name in _ENDPOINTS)
+
+
+def _exporters() -> list[str]:
+    """The exporters that the environment names."""
+    named = os.environ.get("OTEL_TRACES_EXPORTER", "").lower().split(",")
+    return [name.strip() for name in named if name.strip()]
 
 
 def start(*, soon: bool = False) -> None:
     """Send the spans of this process from now on, if they are `wanted`; ``soon``: within a second."""
-    if _tracer is not None or not wanted():
+    if _tracer is not None:
+        return
+    if others := [name for name in _exporters() if name not in {_OTLP, _NONE}]:
+        _LOG.warning(
+            "Sprag sends traces by OTLP only: %s of OTEL_TRACES_EXPORTER is left out.", ", ".join(map(repr, others))
+        )
+    if not wanted():
         return
     try:
         from opentelemetry.exporter.otlp.proto.http.trace_exporter import OTLPSpanExporter

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Iterator, Sequence
+from collections.abc import AsyncIterator, Iterator, MutableMapping, Sequence
 from contextlib import asynccontextmanager
 from datetime import timedelta
 from functools import partial
@@ -80,6 +80,7 @@ from sprag_study.service.http.web import (
 from sprag_study.service.http.web.form import live as live_machine
 from sprag_study.service.http.web.form import page as form
 from sprag_study.service.http.web.rows import pages as rows
+from sprag_study.service.http.web.way_in import RETURN_PATH
 from sprag_study.service.jobs import checks
 from sprag_study.service.jobs.housekeeping import Housekeeping
 from sprag_study.service.jobs.reports.reporter import Reporter
@@ -192,12 +193,18 @@ _ABOUT: Final[dict[str, Any]] = {
 }
 
 
+def _has_secrets(scope: MutableMapping[str, Any]) -> bool:
+    """Whether the query of a request has what nobody else may see: an authorization code."""
+    path: str = scope["path"]
+    return path.endswith(RETURN_PATH)
+
+
 class Application(FastAPI):
     """FastAPI with the guard as outermost layer, outside its own error pages."""
 
     def __init__(self, settings: Settings, access: Access, metrics: Metrics, **options: Any) -> None:
-        # FastAPI has its own spans for requests.
-        super().__init__(telemetry={"tracer_provider": traces.provider()}, **options)
+        # FastAPI has its own spans for requests, with their queries.
+        super().__init__(telemetry={"tracer_provider": traces.provider(), "exclude": _has_secrets}, **options)
         self._settings = settings
         guarded = Guard(Noted(Compression(InDecimals(super().__call__))), settings, access)
         self.drain = Drain(RequestLog(guarded, metrics, access.attempts.address_of))

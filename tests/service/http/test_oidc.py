@@ -18,6 +18,8 @@ from urllib.parse import parse_qs, urlsplit
 import httpx
 import pytest
 from joserfc.jwk import OctKey, RSAKey
+from opentelemetry.sdk.trace.export import SimpleSpanProcessor
+from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanExporter
 from pydantic import SecretStr, ValidationError
 
 from sprag_study.service.actor import Door, Role, act_as, of_machine
@@ -29,6 +31,7 @@ from sprag_study.service.http.oidc import LOGIN_COOKIE, LOGIN_SECONDS
 from sprag_study.service.settings import Settings, UnsafeSettingsError
 from sprag_study.service.storage.people.accounts import Account
 from sprag_study.service.storage.people.audit import AuditFilter
+from sprag_study.worker import traces
 from tests.service.http.openid import CLIENT, Openid, openid
 from tests.service.http.people import OWN, Office
 from tests.service.timed_spec import SPEC
@@ -90,6 +93,21 @@ def no_login(answer: httpx.Response) -> str:
     """What the login page says to a browser that comes back without a login."""
     assert answer.status_code == 401
     return why(answer)
+
+
+def test_codes_are_in_no_trace(opened: Callable[..., Office], provider: Openid) -> None:
+    spans = InMemorySpanExporter()
+    traces.start_with(SimpleSpanProcessor(spans))
+    try:
+        browser = opened().behind_proxy(**OWN, Accept="text/html")
+        assert logged_in(browser, provider, preferred_username="eve", groups=["cad"]).status_code == 303
+        assert back(browser, {"state": "another"}).status_code != 500
+        browser.get("/api/v1/studies", params={"state": "running"})
+    finally:
+        traces.stop()
+    queries = [str((span.attributes or {}).get("url.query", "")) for span in spans.get_finished_spans()]
+    assert "state=running" in queries
+    assert not any("code=" in query for query in queries), queries
 
 
 def why(answer: httpx.Response) -> str:
