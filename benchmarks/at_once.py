@@ -59,6 +59,10 @@ class AtOnce:
     def stop(self, ticket: int) -> None:
         """Nothing runs."""
 
+    def at_work(self) -> dict[int, float]:
+        """None."""
+        return {}
+
     def report(self) -> ExecutorReport:
         """No workers."""
         return ExecutorReport("at once", (), {})

@@ -111,7 +111,7 @@ class Dispatcher:
             try:
                 with suppress(EpochLostError, StoreFullError):
                     self._store.release(self._epoch)
-                    self._stages.keep()
+                    self._stages.keep(self._executor.at_work())
             finally:
                 self._stages.close()
                 self._executor.close()
@@ -128,7 +128,7 @@ class Dispatcher:
             if now >= self._next_beat:
                 report = self._reporter.summary(self._executor.report(), self._machine.in_flight, now)
                 self._store.heartbeat(self._epoch, report)
-                self._stages.keep()
+                self._stages.keep(self._executor.at_work())
                 self._next_beat = now + HEARTBEAT_SECONDS
             if now >= self._next_poll or (self._news is not None and self._news.wait(0.0)):
                 self._poll()
@@ -231,7 +231,7 @@ class Dispatcher:
         self._opening.stop_waiting(number)
         self._handle(dispatch.Paused(number))
         if number not in self._machine.studies and self._opening.adopted(study):
-            self._stages.keep()
+            self._stages.keep(self._executor.at_work())
             self._store.time_is_over(self._epoch, number)
             self._say("The deadline of the study %s has passed.", number)
             self._forget(number)
@@ -277,6 +277,8 @@ class Dispatcher:
             "The study %s: %s. Its kernels are compiled anew and its cases run again.",
             self._ids.get(number, number), reason,
         )  # fmt: skip
+        self._stages.count(self._executor.at_work())
+        self._stages.close()  # their outcomes never come
         self._executor.close()
         self._drop()
         self._executor = self._renew()
@@ -343,7 +345,7 @@ class Dispatcher:
 
     def _settle(self, number: int) -> None:
         """End a study without open chunks, or let it choose its next ones."""
-        self._stages.keep()  # as soon as it has ended, others read how long it took
+        self._stages.keep(self._executor.at_work())  # as soon as it has ended, others read how long it took
         study = self._studies.get(number)
         if study is not None and study.plan is not None:
             try:
@@ -358,7 +360,7 @@ class Dispatcher:
                 again = dispatch.Offered(number) if polled is None else offered(polled)
                 self._handle(replace(again, chunks=appended.chunks, proven=True))
                 return
-        self._stages.keep()
+        self._stages.keep(self._executor.at_work())
         ended = self._store.settle(self._epoch, number)
         self._say("The study %s is %s.", number, ended.value)
         self._forget(number)

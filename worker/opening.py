@@ -40,8 +40,6 @@ class Opening:
         #: Studies waiting for their kernels, and those that cannot run at present; with the time when this began.
         self._compiling: dict[int, float] = {}
         self._short: dict[int, float] = {}
-        #: When a study was last found waiting for its kernel.
-        self._asked: dict[int, float] = {}
         #: The reasons recorded on studies.
         self._notes: dict[int, str | None] = {}
         #: Number of studies of this dispatcher, and the other dispatchers, at the latest poll.
@@ -104,17 +102,17 @@ class Opening:
     def loaded(self, number: int, study: Study, executor: Executor) -> bool:
         """Whether the kernel of a study is loaded; if not, this is reported after a while. Raises KernelError."""
         now = self._clock.monotonic()
-        if number in self._asked:
-            self._stages.spend(number, Stage.COMPILING, now - self._asked.pop(number))
         with self._stages.of_study(number):
             ready = executor.ready(study)
+        if ready or executor.shortage is not None:
+            self._stages.end(number, Stage.COMPILING)
+        else:
+            self._stages.begin(number, Stage.COMPILING)
         if ready:
             self._compiling.pop(number, None)
             self._notes.pop(number, None)
             self._store.note(self.epoch, number, None)  # the reason may come from an earlier dispatcher
             return True
-        if executor.shortage is None:
-            self._asked[number] = now
         if now - self._compiling.setdefault(number, now) >= NOTE_SECONDS:
             self._note(number, executor.shortage or COMPILING)
         return False
@@ -140,12 +138,13 @@ class Opening:
 
     def stop_waiting(self, number: int) -> bool:
         """Let a study no longer wait for its kernel; whether it did."""
-        self._asked.pop(number, None)
+        self._stages.end(number, Stage.COMPILING)
         return self._compiling.pop(number, None) is not None
 
     def forget(self, number: int) -> None:
         """Drop what is known of a study."""
-        for known in (self._compiling, self._asked, self._short, self._notes):
+        self._stages.end(number, Stage.COMPILING)
+        for known in (self._compiling, self._short, self._notes):
             known.pop(number, None)
 
     def unnoted(self, number: int) -> None:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from sprag_study.worker.models import ChunkResult
     from sprag_study.worker.planning.rounds import Rows
     from sprag_study.worker.reports import ExecutorReport
-    from sprag_study.worker.stages import Stage
+    from sprag_study.worker.stages import Spent, Stage
     from sprag_study.worker.states import StudyState
     from sprag_study.worker.study import Study
 
@@ -165,8 +165,8 @@ class Store(Protocol):
         A missing heartbeat raises alarms but never decides ownership.
         """
 
-    def spent(self, spent: Mapping[int, Mapping[Stage, float]]) -> None:
-        """Add seconds to the stages of studies, whoever they belong to."""
+    def spent(self, spent: Mapping[int, Mapping[Stage, Spent]]) -> None:
+        """Add to the stages of studies, by number, whoever they belong to."""
 
     def active_studies(self) -> list[ActiveStudy]:
         """Studies that have not ended, by priority and then in order of submission.
@@ -270,6 +270,7 @@ class Outcome:
     """The end of one submitted chunk.
 
     ``result`` and the ``host`` that computed it are given when the fate is DONE; otherwise ``detail`` explains it.
+    ``seconds`` is how long a worker had it, in elapsed time; 0 where none took it.
     """
 
     ticket: int
@@ -277,6 +278,7 @@ class Outcome:
     result: ChunkResult | None = None
     detail: str = ""
     host: str = ""
+    seconds: float = 0.0
 
 
 class Executor(Protocol):
@@ -304,6 +306,9 @@ class Executor(Protocol):
 
     def stop(self, ticket: int) -> None:
         """Stop a chunk, running or not; its outcome is STOPPED unless it has just finished."""
+
+    def at_work(self) -> Mapping[int, float]:
+        """How long workers have had the chunks that are not back yet, in s by ticket, without those in a queue."""
 
     def report(self) -> ExecutorReport:
         """The workers as they are now; asks nobody."""

@@ -126,7 +126,7 @@ class StageSeconds(TypedDict):
         str,
         Doc(
             "waiting (until its first case), checking, compiling, computing, writing, planning (of further rounds), "
-            "interrupted (held, or nothing of it ran in between), report, sending"
+            "interrupted (held, or nothing of it ran in between), report (made and sent)"
         ),
     ]
     seconds: Annotated[float, Doc("how long it took in all, in s; together the stages fill the time")]

@@ -231,13 +231,17 @@ def night(
 
 def _show_stages(runs: list[dict[str, Any]]) -> None:
     """Show how long each stage of the runs took that are over."""
-    columns = ((_("due"), False), (_("stage"), False), (_("from"), False), (_("until"), False), (_("time"), True))
+    columns = (
+        (_("schedule"), False), (_("study"), False, True), (_("stage"), False),
+        (_("from"), False, True), (_("until"), False, True), (_("time"), True),
+    )  # fmt: skip
     rows = [
         (
-            _clock(run["due_local"]),
+            run["name"] or run["schedule"],
+            run["study"],
             _(STAGE_NAMES[stage["stage"]]),
-            _clock(stage["begin_local"]),
-            _clock(stage["end_local"]),
+            _clock(stage["begin_local"], seconds=True),
+            _clock(stage["end_local"], seconds=True),
             duration_text(stage["seconds"]),
         )
         for run in runs
@@ -397,6 +401,6 @@ def _known(text: str | None) -> str | None:
     return earlier.said(_(text)) if text else text
 
 
-def _clock(text: str) -> str:
-    """A time on the wall clock of a schedule with its offset: ``2027-01-31 22:00 +01:00``."""
-    return f"{text[:10]} {text[11:16]} {text[-6:]}"
+def _clock(text: str, *, seconds: bool = False) -> str:
+    """A time on the wall clock of a schedule with its offset: ``2027-01-31 22:00 +01:00``, or with ``seconds``."""
+    return f"{text[:10]} {text[11 : 19 if seconds else 16]} {text[-6:]}"

@@ -82,14 +82,14 @@ def report_json(report: ReportRecord) -> SentReport:
 
 
 def _stages(run: Run, reports: Iterable[ReportRecord]) -> list[StageSeconds] | None:
-    """What took how long, from the due time until the last report was sent; None until that is known."""
+    """What took how long, from the due time to the end of the study or to its last report; None until it is over."""
     outcome = run.outcome
     if outcome.stages is None:
         return None
     stages = outcome.stages
-    if outcome.ended_at is not None and run.concluded_at is not None:
+    if outcome.ended_at is not None:
         sent = (report.ended_at for report in reports if report.kind == "run" and report.ended_at is not None)
-        stages += report_stages(outcome.ended_at, run.concluded_at, sent)
+        stages += report_stages(outcome.ended_at, sent)
     return [
         filled(
             StageSeconds,

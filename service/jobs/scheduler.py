@@ -22,7 +22,7 @@ from sprag_study.service.schedules.policies import Overlap, due_times
 from sprag_study.service.storage.errors import RunClosedError, StudyNotFoundError
 from sprag_study.service.storage.part import moment
 from sprag_study.worker import traces
-from sprag_study.worker.stages import Stage
+from sprag_study.worker.stages import Spent, Stage
 from sprag_study.worker.states import TransitionError
 
 if TYPE_CHECKING:
@@ -131,7 +131,7 @@ class Scheduler(PollingThread):
 
         if not self._may_overlap(run):
             return
-        began = self._store.clock.monotonic()
+        began, begin = self._store.clock.monotonic(), self._store.clock.now()
         try:
             parsed = parse_spec(accepted(run.fields.spec, self._latest(run)))
             if run.fields.name:
@@ -151,7 +151,7 @@ class Scheduler(PollingThread):
             self._next_try.pop((run.schedule, run.due), None)
             _LOG.info("No study is submitted: %s.", error)
             return
-        checking = self._store.clock.monotonic() - began
+        checking = Spent(self._store.clock.monotonic() - began, begin, self._store.clock.now())
         self._store.times.add({study.number: {Stage.CHECKING: checking}})
         self._next_try.pop((run.schedule, run.due), None)
         _LOG.info("The schedule %s was due: study %s.", run.id, study.id)

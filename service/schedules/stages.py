@@ -12,6 +12,8 @@ from sprag_study.worker.stages import Stage
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+    from sprag_study.worker.stages import Spent
+
 STAGE_NAMES: Final = {
     Stage.WAITING: N_("Waiting for its first case"),
     Stage.CHECKING: N_("Checking"),
@@ -20,28 +22,12 @@ STAGE_NAMES: Final = {
     Stage.WRITING: N_("Writing rows"),
     Stage.PLANNING: N_("Planning further rounds"),
     Stage.INTERRUPTED: N_("Held, or behind other studies"),
-    Stage.REPORT: N_("Making the report"),
-    Stage.SENDING: N_("Sending the report"),
+    Stage.REPORT: N_("Making and sending the report"),
 }
 
-
-@dataclass(frozen=True, slots=True)
-class StudyTimes:
-    """When a study was created and when its chunks ran.
-
-    Attributes
-    ----------
-    created : when it was submitted
-    began, ended : start of its first chunk and end of its last one; None where none has run
-    idle : s between the two in which no chunk of it was running
-    measured : s of the stages that were measured
-    """
-
-    created: datetime
-    began: datetime | None
-    ended: datetime | None
-    idle: float
-    measured: Mapping[Stage, float]
+#: The stages of a study that are measured, and those with which it begins to run.
+_MEASURED: Final = (Stage.CHECKING, Stage.COMPILING, Stage.COMPUTING, Stage.WRITING, Stage.PLANNING)
+_AT_WORK: Final = (Stage.COMPUTING, Stage.WRITING, Stage.PLANNING)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,44 +51,32 @@ class StageTime:
         return cls(Stage(stage), float(seconds), begin, end)
 
 
-def study_stages(due: datetime, times: StudyTimes, end: datetime) -> tuple[StageTime, ...]:
+def study_stages(due: datetime, measured: Mapping[Stage, Spent], end: datetime) -> tuple[StageTime, ...]:
     """The stages of a study that was due at ``due`` and ended at ``end``, without those that took no time.
 
-    Together they are the time between the two. Rows are written while other cases are computed: computing is the time
-    with chunks at work less that of writing.
+    Together they are the time between the two: what was ``measured``, as far as there is time for it, and of the rest
+    the part before its first case is waiting, and the other one interruptions.
     """
-    measured = times.measured
-    began, last = times.began or end, times.ended or end
-    checking = measured.get(Stage.CHECKING, 0.0)
-    compiling = measured.get(Stage.COMPILING, 0.0)
-    planning = measured.get(Stage.PLANNING, 0.0)
-    before = max(_seconds(due, began) - checking, 0.0)
+    left = max((end - due).total_seconds(), 0.0)
+    stages = {}
+    for stage in _MEASURED:
+        if spent := measured.get(stage):
+            stages[stage] = StageTime(stage, min(spent.seconds, left), spent.begin, spent.end)
+            left -= stages[stage].seconds
+    began = min((stages[stage].begin for stage in _AT_WORK if stage in stages), default=end)
     # A study can wait for its kernel once more, when its dispatcher has changed.
-    compiled_later = max(compiling - before, 0.0)
-    busy = max(_seconds(began, last) - times.idle, 0.0)
-    writing = min(measured.get(Stage.WRITING, 0.0), busy)
-    between = times.idle + max(_seconds(last, end), 0.0)
-    stages = (
-        StageTime(Stage.WAITING, max(before - compiling, 0.0), due, began),
-        StageTime(Stage.CHECKING, checking, due, times.created),
-        StageTime(Stage.COMPILING, compiling, times.created, end if compiled_later else began),
-        StageTime(Stage.COMPUTING, busy - writing, began, last),
-        StageTime(Stage.WRITING, writing, began, last),
-        StageTime(Stage.PLANNING, planning, began, end),
-        StageTime(Stage.INTERRUPTED, max(between - planning - compiled_later, 0.0), began, end),
+    before = sum(
+        min(stage.seconds, max((began - stage.begin).total_seconds(), 0.0))
+        for stage in stages.values()
+        if stage.stage not in _AT_WORK
     )
-    return tuple(stage for stage in stages if stage.seconds > 0.0)
+    waiting = min(max((began - due).total_seconds() - before, 0.0), left)
+    stages[Stage.WAITING] = StageTime(Stage.WAITING, waiting, due, began)
+    stages[Stage.INTERRUPTED] = StageTime(Stage.INTERRUPTED, left - waiting, began, end)
+    return tuple(stages[stage] for stage in Stage if stage in stages and stages[stage].seconds > 0.0)
 
 
-def report_stages(ended: datetime, concluded: datetime, sent: Iterable[datetime]) -> tuple[StageTime, ...]:
-    """The stages of a run from the end of its study at ``ended`` to its last report that was ``sent``."""
-    last = max(sent, default=concluded)
-    stages = (
-        StageTime(Stage.REPORT, _seconds(ended, concluded), ended, concluded),
-        StageTime(Stage.SENDING, _seconds(concluded, last), concluded, last),
-    )
-    return tuple(stage for stage in stages if stage.seconds > 0.0)
-
-
-def _seconds(begin: datetime, end: datetime) -> float:
-    return (end - begin).total_seconds()
+def report_stages(ended: datetime, sent: Iterable[datetime]) -> tuple[StageTime, ...]:
+    """The stage of a run from the end of its study at ``ended`` to its last report that was ``sent``, if any was."""
+    last = max(sent, default=ended)
+    return (StageTime(Stage.REPORT, (last - ended).total_seconds(), ended, last),) if last > ended else ()

@@ -171,13 +171,17 @@ ENDINGS = sa.Table(
     sqlite_with_rowid=False,
 )
 
-#: Seconds of the stages of studies that are measured (`sprag_study.worker.stages`), added to as they pass.
+#: Seconds of the stages of studies that are measured (`sprag_study.worker.stages`), added to as they pass, and between
+#: which times they lie.
 STAGES = sa.Table(
     "stages",
     METADATA,
     sa.Column("study", sa.Integer, sa.ForeignKey("studies.number"), primary_key=True),
     sa.Column("stage", sa.String(12), primary_key=True),
     sa.Column("seconds", sa.Double, nullable=False),
+    # NULL: from before revision 0046.
+    sa.Column("began_at", sa.BigInteger),
+    sa.Column("ended_at", sa.BigInteger),
     sqlite_with_rowid=False,
 )
 

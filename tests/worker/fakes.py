@@ -85,6 +85,12 @@ def run(
     return result(task.first, task.count, models.Ending.DIVERGED if failing else models.OK)
 
 
+def run_slowly(task: ChunkTask, *, seconds: float) -> ChunkResult:
+    """Run a chunk in so many seconds."""
+    time.sleep(seconds)
+    return result(task.first, task.count)
+
+
 def spinning(task: ChunkTask) -> ChunkResult:
     """Never comes back, and uses all the processor time it can get."""
     while True:

@@ -25,7 +25,7 @@ from distributed.scheduler import KilledWorker
 from sprag_study.sentences import Sentence, joined
 from sprag_study.worker import fingerprint, models, traces
 from sprag_study.worker.executors import dask_tasks as tasks
-from sprag_study.worker.executors.dask_jobs import Job, Waiting, Worker, outcome_of, refusals, report_of
+from sprag_study.worker.executors.dask_jobs import Job, Waiting, Worker, outcome_of, refusals, report_of, without_rows
 from sprag_study.worker.executors.dask_link import CONFIG, Link, own_cluster, value_of
 from sprag_study.worker.executors.process_pool import MAX_LOADS, useful_chunks
 from sprag_study.worker.limits import WALL_TIMES
@@ -193,7 +193,15 @@ class DaskExecutor:
             self._waiting = kept
             for job in running:
                 job.dropped = time.monotonic()
-            self._outcomes.put(Outcome(ticket, Fate.STOPPED, detail="stopped"))
+                self._outcomes.put(without_rows(job, Fate.STOPPED, "stopped"))
+            if not running:
+                self._outcomes.put(Outcome(ticket, Fate.STOPPED, detail="stopped"))
+
+    def at_work(self) -> dict[int, float]:
+        """How long workers have had the chunks that are not back yet, in s by ticket."""
+        with self._lock:
+            jobs = [worker.job for worker in self._workers.values()]
+            return {job.ticket: job.seconds for job in jobs if job and job.kind == "chunk" and job.dropped is None}
 
     def report(self) -> ExecutorReport:
         """The workers that the last poll found."""
@@ -248,7 +256,7 @@ class DaskExecutor:
         with self._lock:
             for worker in self._workers.values():
                 if (job := worker.job) and job.kind == "chunk" and job.dropped is None:
-                    self._outcomes.put(Outcome(job.ticket, Fate.STOPPED, detail="the scheduler was lost"))
+                    self._outcomes.put(without_rows(job, Fate.STOPPED, "the scheduler was lost"))
         self._disconnect(timeout=1.0)
         self._return_waiting(now)
         if self._gone_since is None:
@@ -294,13 +302,13 @@ class DaskExecutor:
         if job.kind == "load" and job.shape is not None:
             self._died_of(worker.host, job.shape)
         elif job.kind == "chunk" and job.dropped is None:
-            taken = time.monotonic() - job.began
+            taken = job.seconds
             # Dask does not say of what a worker died. Before this it cannot have been the limit.
             if taken >= self._timeout:
                 detail = f"its worker was gone after {taken:.3g} s; the limit is {self._timeout:g} s of processor time"
-                self._outcomes.put(Outcome(job.ticket, Fate.TIMED_OUT, detail=detail))
+                self._outcomes.put(without_rows(job, Fate.TIMED_OUT, detail))
             else:
-                self._outcomes.put(Outcome(job.ticket, Fate.CRASHED, detail="its worker died"))
+                self._outcomes.put(without_rows(job, Fate.CRASHED, "its worker died"))
         elif job.kind == "introduce":
             _LOG.error("The worker %s left before it reported its fingerprint.", worker.address)
 
@@ -363,7 +371,7 @@ class DaskExecutor:
                 self._died(worker, job)
             elif job.kind == "chunk" and job.dropped is None:
                 self._cases[worker.host] += 0 if error is not None else value.count
-                self._outcomes.put(outcome_of(job.ticket, value, error, worker.host))
+                self._outcomes.put(outcome_of(job, value, error, worker.host))
             elif job.kind == "introduce":
                 self._introduced(worker, value, error)
             elif job.shape is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import time
 from concurrent.futures import CancelledError
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
@@ -37,6 +38,11 @@ class Job:
     shape: models.KernelShape | None = None
     future: Future[Any] | None = None
     dropped: float | None = None
+
+    @property
+    def seconds(self) -> float:
+        """How long ago it was given to its worker, in s."""
+        return time.monotonic() - self.began
 
 
 @dataclass(eq=False, slots=True)
@@ -121,12 +127,17 @@ def report_of(link: Link, workers: Iterable[Worker], cases: Mapping[str, int], s
     return ExecutorReport("dask", tuple(found), dict(cases), shortage or "", link.address, link.dashboard)
 
 
-def outcome_of(ticket: int, value: Any, error: BaseException | None, host: str) -> Outcome:
+def outcome_of(job: Job, value: Any, error: BaseException | None, host: str) -> Outcome:
     """The outcome of a chunk whose worker, on ``host``, returned a value, or an error."""
     if error is None:
-        return Outcome(ticket, Fate.DONE, value, host=host)
+        return Outcome(job.ticket, Fate.DONE, value, host=host, seconds=job.seconds)
     if isinstance(error, CancelledError):
-        return Outcome(ticket, Fate.STOPPED, detail=f"its result was lost on the way ({error})")
+        return without_rows(job, Fate.STOPPED, f"its result was lost on the way ({error})")
     if isinstance(error, OtherFingerprintError):
-        return Outcome(ticket, Fate.STOPPED, detail="another process has the address of its worker")
-    return Outcome(ticket, Fate.CRASHED, detail=f"{type(error).__name__}: {error}")
+        return without_rows(job, Fate.STOPPED, "another process has the address of its worker")
+    return without_rows(job, Fate.CRASHED, f"{type(error).__name__}: {error}")
+
+
+def without_rows(job: Job, fate: Fate, detail: str) -> Outcome:
+    """The outcome of a chunk that its worker has not finished."""
+    return Outcome(job.ticket, fate, detail=detail, seconds=job.seconds)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 import time
 from collections import deque
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from sprag_study.worker import models, traces
@@ -55,12 +56,14 @@ class InlineExecutor:
             time.sleep(timeout)
             return []
         ticket, run, task = self._waiting.popleft()
+        began = time.monotonic()
         try:
             result = run(task)
+            outcome = Outcome(ticket, Fate.DONE, result, host=socket.gethostname())
             self._cases += result.count
-            return [Outcome(ticket, Fate.DONE, result, host=socket.gethostname())]
         except Exception as error:  # a bug, reported like the crash of a process
-            return [Outcome(ticket, Fate.CRASHED, detail=f"{type(error).__name__}: {error}")]
+            outcome = Outcome(ticket, Fate.CRASHED, detail=f"{type(error).__name__}: {error}")
+        return [replace(outcome, seconds=time.monotonic() - began)]
 
     def stop(self, ticket: int) -> None:
         """Drop a chunk that has not run."""
@@ -68,6 +71,10 @@ class InlineExecutor:
         if len(kept) < len(self._waiting):
             self._waiting = kept
             self._stopped.append(Outcome(ticket, Fate.STOPPED, detail="stopped"))
+
+    def at_work(self) -> dict[int, float]:
+        """None: `wait` runs a chunk to its end."""
+        return {}
 
     def report(self) -> ExecutorReport:
         """This process, between two chunks."""

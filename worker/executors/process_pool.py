@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import socket
 from collections import Counter
+from dataclasses import replace
 from functools import partial
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
@@ -146,7 +147,9 @@ class ProcessPoolExecutor:
         self._jobs[ticket] = job = self._pool.schedule(
             self._wall, within_processor_time, self._timeout, traces.carried("run chunk", self._run), task
         )
-        job.future.add_done_callback(lambda done: self._ready.put(self._outcome(ticket, done)))
+        job.future.add_done_callback(
+            lambda done: self._ready.put(replace(self._outcome(ticket, done), seconds=job.seconds or 0.0))
+        )
 
     def _outcome(self, ticket: int, future: Future[models.ChunkResult]) -> Outcome:
         error = JobStoppedError() if future.cancelled() else future.exception()
@@ -189,6 +192,11 @@ class ProcessPoolExecutor:
         """Stop a chunk, with its process when it runs."""
         if job := self._jobs.get(ticket):
             job.stop()
+
+    def at_work(self) -> dict[int, float]:
+        """How long processes have had the chunks that are not back yet, in s by ticket."""
+        seconds = {ticket: job.seconds for ticket, job in self._jobs.items()}
+        return {ticket: taken for ticket, taken in seconds.items() if taken is not None}
 
     def report(self) -> ExecutorReport:
         """The processes of the pool; they start with the first chunk."""

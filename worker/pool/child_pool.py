@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from queue import Empty, SimpleQueue
@@ -37,9 +38,15 @@ class Job(Generic[R]):
 
     def __init__(self) -> None:
         self.begun: Future[None] = Future()
+        self._received: float | None = None
         self._child: ChildProcess | None = None
         self._stopped = False
         self._lock = threading.Lock()
+
+    @property
+    def seconds(self) -> float | None:
+        """How long ago its process received it, in s; None while it waits for one, or for one that starts."""
+        return None if self._received is None else time.monotonic() - self._received
 
     def stop(self) -> None:
         """End the job, with its process if it is running. A job that has just finished stays done."""
@@ -57,6 +64,9 @@ class Job(Generic[R]):
                 raise JobStoppedError
             self._child = child
             child.start()
+
+    def _note_received(self) -> None:
+        self._received = time.monotonic()
 
     def _leave(self) -> bool:
         """Release the process from this job; whether the job was stopped."""
@@ -141,7 +151,7 @@ class ChildPool:
         for last in (False, False, True):
             try:
                 job._enter(child)
-                value: R = child.run(function, args, timeout, receive)
+                value: R = child.run(function, args, timeout, receive, job._note_received)
                 break
             except (ProcessDiedError, ProcessStartError) as error:
                 if job._leave() or self._closed:

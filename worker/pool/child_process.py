@@ -99,16 +99,20 @@ class ChildProcess:
         args: tuple[Any, ...],
         timeout: float,
         receive: Callable[[bytes], None] | None = None,
+        received: Callable[[], None] | None = None,
     ) -> Any:
         """The value of ``function(*args)``, computed by the process that was started; everything must be picklable.
 
         ``receive`` is called with each piece that the function gives to `send_piece`; until it returns, which takes as
-        long as it likes, the function may fill the pipe and then waits.
+        long as it likes, the function may fill the pipe and then waits. ``received`` is called once the process has the
+        function.
 
         Raises TimeoutError after ``timeout`` s, not counting time in `uncounted` (the process is then killed),
         ProcessDiedError when it died, ProcessStartError when it died before it began, or the function's exception.
         """
         pipe = self._give(pickle.dumps((function, args), protocol=pickle.HIGHEST_PROTOCOL))
+        if received is not None:
+            received()
         try:
             is_value, found = _read(pipe, *self._answer_of(pipe, timeout, receive), timeout)
         except TimeoutError:

@@ -170,10 +170,7 @@ class EndedRun:
 
 @dataclass(frozen=True, slots=True)
 class NightRun:
-    """A due time with its schedule: id, name, zone and ``trouble_flags``.
-
-    ``concluded_at`` is when it was found to be over; None where it has not been.
-    """
+    """A due time with its schedule: id, name, zone and ``trouble_flags``."""
 
     schedule: str
     name: str
@@ -182,7 +179,6 @@ class NightRun:
     study: str | None
     outcome: Outcome
     trouble_flags: tuple[str, ...] | None
-    concluded_at: datetime | None
 
 
 def runs_with_studies() -> sa.FromClause:
@@ -385,7 +381,6 @@ class Runs(Part):
                 row.study,
                 outcome_of(row),
                 trouble_flags_of(row),
-                optional_moment(row.concluded_at),
             )
             for row in rows
         ]
