@@ -44,8 +44,8 @@ def takes_variable(address: str) -> bool:
 
 def _place(address: str) -> tuple[object, ...]:
     """What tells the address of one service from another's: without user, the usual port, and a slash at the end."""
-    parts = urlsplit(address)
     try:
+        parts = urlsplit(address)
         port = parts.port or _PORTS.get(parts.scheme)
     except ValueError:
         return (address,)

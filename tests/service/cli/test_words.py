@@ -231,6 +231,12 @@ def test_the_secret_of_this_machine_is_not_sent_to_the_service_of_a_login(
         assert "authorization" not in client._http.headers
 
 
+def test_an_address_that_is_none_is_refused(sprag: Sprag, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SPRAG_SERVER", "http://[::1")
+    done = sprag("list", "--json")
+    assert (done.code, done.failure["code"]) == (2, "invalid-parameter")
+
+
 def test_a_damaged_login_is_none(login: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     login.parent.mkdir(parents=True)
     login.write_text("not JSON")
