@@ -49,6 +49,8 @@ _PARENT: Final = "traceparent"
 
 _provider: TracerProvider | None = None
 _tracer: Tracer | None = None
+#: Whether this process has tried to start: what it lacks is logged once, and not at every chunk.
+_tried = False
 
 
 def wanted() -> bool:
@@ -67,12 +69,15 @@ def _exporters() -> list[str]:
 
 def start(*, soon: bool = False) -> None:
     """Send the spans of this process from now on, if they are `wanted`; ``soon``: within a second."""
-    if _tracer is not None:
+    global _tried  # noqa: PLW0603 - there is one in a process
+    if _tracer is not None or _tried:
         return
-    if others := [name for name in _exporters() if name not in {_OTLP, _NONE}]:
+    others = [name for name in _exporters() if name not in {_OTLP, _NONE}]
+    if others:
         _LOG.warning(
             "Sprag sends traces by OTLP only: %s of OTEL_TRACES_EXPORTER is left out.", ", ".join(map(repr, others))
         )
+    _tried = wanted() or bool(others)
     if not wanted():
         return
     try:
@@ -103,8 +108,8 @@ def start_with(processor: SpanProcessor) -> None:
 
 def stop() -> None:
     """Send what is left, and no more."""
-    global _provider, _tracer
-    provider, _provider, _tracer = _provider, None, None
+    global _provider, _tracer, _tried
+    provider, _provider, _tracer, _tried = _provider, None, None, False
     if provider is not None:
         provider.shutdown()
 

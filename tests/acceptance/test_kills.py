@@ -72,5 +72,8 @@ def test_a_copy_made_during_a_run_goes_on_where_it_was_made(tmp_path: Path, spra
     assert 20 < done < 120
     assert sprag("admin", "db", "check", "--db", copy).code == 0
     with Store.open(f"sqlite:///{copy}") as store:
-        Dispatcher(store.work, InlineExecutor(), SystemClock()).run(lambda: store.studies.get(study).over)
+        assert store.studies.look(study)[1].done == done
+        executor = InlineExecutor()
+        Dispatcher(store.work, executor, SystemClock()).run(lambda: store.studies.get(study).over)
+    assert sum(executor.report().cases.values()) == 120 - done
     harness.compare(copy, study, made, ranges=[(16, 16), (104, 16)])

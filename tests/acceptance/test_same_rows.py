@@ -51,7 +51,7 @@ def test_settled_cases_have_the_same_rows_in_any_cut(tmp_path: Path, sprag: Call
 
 def test_http_gives_the_same_rows_and_curves(tmp_path: Path, reference: list[dict[str, Any]]) -> None:
     with (
-        service(tmp_path, "--processes", 1, "--chunk", 7) as running,
+        service(tmp_path, "--processes", 2, "--chunk", 7) as running,
         httpx.Client(base_url=f"{running.address}/api/v1", timeout=SECONDS) as client,
     ):
         study = f"/studies/{client.post('/studies', json=FEW).json()['id']}"
