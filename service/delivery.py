@@ -65,6 +65,13 @@ class Delivery:
         """Whether any report can leave."""
         return self.mail_server is not None or bool(self.origins)
 
+    def reaches(self, target: str) -> bool:
+        """Whether reports can go to ``target``, a mail address or the address of a webhook."""
+        origin = origin_of(target)
+        if origin is not None:
+            return origin in self.origins
+        return self.mail_server is not None and in_domains(target, self.domains)
+
 
 class DeliverySettings(BaseSettings):
     """The settings of reports; a part of `sprag_study.service.settings.Settings`."""
@@ -173,8 +180,13 @@ class DeliverySettings(BaseSettings):
         if texts is None:
             return value
         for text in texts:
-            if not is_mail_address(text) and origin_of(text) not in info.data.get("webhook_origins", ()):
-                raise ValueError("mail addresses are needed, or addresses at SPRAG_WEBHOOK_ORIGINS")
+            if not is_mail_address(text):
+                if origin_of(text) not in info.data.get("webhook_origins", ()):
+                    raise ValueError("mail addresses are needed, or addresses at SPRAG_WEBHOOK_ORIGINS")
+            elif "smtp_url" in info.data and info.data["smtp_url"] is None:
+                raise ValueError("mail addresses need a mail server (SPRAG_SMTP_URL)")
+            elif not in_domains(text, info.data.get("mail_domains", ())):
+                raise ValueError("mail addresses must have a domain of SPRAG_MAIL_DOMAINS")
         return tuple(texts)
 
     def delivery(self, own_url: str, prefix: str = "") -> Delivery:
@@ -232,6 +244,11 @@ def origin_of(url: str) -> str | None:
         return None
     host = f"[{place.hostname}]" if ":" in place.hostname else place.hostname
     return f"{place.scheme}://{host.lower()}:{port}"
+
+
+def in_domains(address: str, domains: tuple[str, ...]) -> bool:
+    """Whether a mail address has one of the ``domains``; any has where there are none."""
+    return not domains or address.rpartition("@")[2].lower() in domains
 
 
 def is_mail_address(text: str) -> bool:

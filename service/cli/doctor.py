@@ -29,8 +29,6 @@ _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "sqlalchemy", "fastapi", "u
 _KERNEL = {"pendulums": 1, "coefficients": 4, "tolerance": 1e-9}
 #: Backups are made every night.
 _OLD_BACKUP = timedelta(hours=49)
-#: Where the settings say nothing; a study of a million cases of one pendulum takes about half of this.
-_LEAST_FREE_BYTES = 1_000_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -279,8 +277,8 @@ def _alerts(url: str, file: Path | None) -> tuple[bool, str]:
 def _disk(location: Path) -> tuple[bool, str]:
     folder = next(parent for parent in location.absolute().parents if parent.exists())
     free = shutil.disk_usage(folder).free
-    least = read_settings().disk_free * 2**20 or _LEAST_FREE_BYTES
-    return free >= least, _("{size} GB free at {folder}", size=decimal(f"{free / 1e9:.3g}"), folder=folder)
+    text = _("{size} GB free at {folder}", size=decimal(f"{free / 1e9:.3g}"), folder=folder)
+    return free >= read_settings().disk_free * 2**20, text
 
 
 def _backups() -> tuple[bool, str]:

@@ -164,7 +164,8 @@ def run_dispatcher(
         store.require_sound()
         store.people.default_quota = settings.quota
         lock = lock_of(store)
-        maintenance = Maintenance(store, _possible(store, settings.maintenance, say))
+        plan = _possible(store, settings.maintenance, say)
+        maintenance = Maintenance(store, plan, delivery=settings.delivery)
         reports = [Reporter(store, settings.delivery)] if settings.delivery.wanted else []
         chores = Chores(
             lock,

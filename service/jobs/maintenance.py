@@ -29,6 +29,7 @@ from sprag_study.service.storage.errors import StoreError
 from sprag_study.service.storage.maintenance import PART_SUFFIX
 
 if TYPE_CHECKING:
+    from sprag_study.service.delivery import Delivery
     from sprag_study.service.storage.alerts import AlertKind
     from sprag_study.service.storage.store import Store
 
@@ -92,6 +93,40 @@ def make_backup(store: Store, folder: Path, now: datetime) -> Path:
     return target
 
 
+def backup_failed(error: Exception) -> Sentence:
+    """That a backup failed, and why."""
+    problem = str(error).strip().removesuffix(".") or type(error).__name__
+    return Sentence(recorded.BACKUP_FAILED, problem=problem)
+
+
+def alert(
+    store: Store, plan: MaintenancePlan, delivery: Delivery | None, kind: AlertKind, problem: Sentence | None
+) -> None:
+    """Begin the alert, or end it where there is no problem; a copy of the deployment says nothing to anybody.
+
+    Reports go where the ``plan`` says, as far as ``delivery`` reaches; None reaches all.
+    """
+    try:
+        if problem is None:
+            if store.alerts.end(kind):
+                _LOG.info("All is well again: %s.", kind)
+            return
+        copy = store.deployment.is_copy()
+        if not copy and store.alerts.begin(kind, problem, plan.alert_to, plan.zone, delivery):
+            _LOG.error("%s", problem)
+    except StoreError as error:
+        _LOG.warning("An alert is noted later: %s", error)
+
+
+def _free(folder: Path) -> int | None:
+    """Free bytes of the disk of ``folder``; None where there is no such folder, or its disk does not say."""
+    try:
+        return shutil.disk_usage(folder).free if folder.is_dir() else None
+    except OSError as error:
+        _LOG.warning("The free space of %s is not known: %s", folder, error)
+        return None
+
+
 @dataclass(slots=True)
 class _Task:
     """A nightly task; `do` gets the time, the due time and whether the clock is trusted, and returns whether it was
@@ -109,10 +144,17 @@ class _Task:
 class Maintenance(threading.Thread):
     """Carries out the plan every night by the store's clock, until `stop`."""
 
-    def __init__(self, store: Store, plan: MaintenancePlan, watch: ClockWatch | None = None) -> None:
+    def __init__(
+        self,
+        store: Store,
+        plan: MaintenancePlan,
+        watch: ClockWatch | None = None,
+        delivery: Delivery | None = None,
+    ) -> None:
         super().__init__(name="sprag-maintenance", daemon=True)
         self._store = store
         self._plan = plan
+        self._delivery = delivery
         self._watch = watch or ClockWatch(store.dispatchers)
         self._ending = threading.Event()
         self._tasks: list[_Task] = []
@@ -166,8 +208,7 @@ class Maintenance(threading.Thread):
                 )
                 task.wait_until = now + AGAIN
                 if task.name == _BACKUP:
-                    problem = str(error).strip().removesuffix(".") or type(error).__name__
-                    self._alert("backup", Sentence(recorded.BACKUP_FAILED, problem=problem))
+                    self._alert("backup", backup_failed(error))
                 continue
             if task.name == _BACKUP:
                 self._alert("backup", None)
@@ -182,7 +223,7 @@ class Maintenance(threading.Thread):
             *([] if session.on_server else [session.path.parent]),
             *([self._plan.folder] if self._plan.folder else []),
         ]
-        free = {folder: shutil.disk_usage(folder).free for folder in folders if folder.is_dir()}
+        free = {folder: size for folder in folders if (size := _free(folder)) is not None}
         if not free:
             return
         fullest = min(free, key=lambda folder: free[folder])
@@ -193,17 +234,7 @@ class Maintenance(threading.Thread):
             self._alert("disk", None)
 
     def _alert(self, kind: AlertKind, problem: Sentence | None) -> None:
-        """Begin the alert, or end it where there is no problem; a copy of the deployment says nothing to anybody."""
-        try:
-            if problem is None:
-                if self._store.alerts.end(kind):
-                    _LOG.info("All is well again: %s.", kind)
-                return
-            copy, plan = self._store.deployment.is_copy(), self._plan
-            if not copy and self._store.alerts.begin(kind, problem, plan.alert_to, plan.zone):
-                _LOG.error("%s", problem)
-        except StoreError as error:
-            _LOG.warning("An alert is noted later: %s", error)
+        alert(self._store, self._plan, self._delivery, kind, problem)
 
     def _back_up(self, folder: Path, now: datetime, due: datetime, believed: bool) -> bool:
         """Write a backup unless there is one since ``due``; then remove the oldest."""

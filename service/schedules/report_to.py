@@ -7,7 +7,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag_study.sentences import Sentence, plural
-from sprag_study.service.delivery import is_mail_address, origin_of
+from sprag_study.service.delivery import in_domains, is_mail_address, origin_of
 from sprag_study.service.spec.node import Node
 from sprag_study.service.spec.report import Report
 
@@ -87,7 +87,7 @@ def require_deliverable(wanted: ReportTo, delivery: Delivery) -> None:
             allowed="none, until the administrator sets a mail server (SPRAG_SMTP_URL)",
         )  # fmt: skip
     for number, address in enumerate(wanted.email):
-        if not mail_allowed(address, delivery):
+        if not in_domains(address, delivery.domains):
             allowed = Sentence("addresses of {domains} (SPRAG_MAIL_DOMAINS)", domains=", ".join(delivery.domains))
             node["report_email"][number].refuse(
                 "invalid-choice", "has a domain to which no reports go", allowed=allowed
@@ -98,8 +98,3 @@ def require_deliverable(wanted: ReportTo, delivery: Delivery) -> None:
             allowed = Sentence("addresses at {origins} (SPRAG_WEBHOOK_ORIGINS)", origins=", ".join(delivery.origins))
         node["report_webhook"].refuse("invalid-choice", "has an origin to which no webhooks go", allowed=allowed)
     node.report.raise_if_any()
-
-
-def mail_allowed(address: str, delivery: Delivery) -> bool:
-    """Whether reports may go to that address."""
-    return not delivery.domains or address.rpartition("@")[2].lower() in delivery.domains

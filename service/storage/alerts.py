@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from datetime import datetime
 
+    from sprag_study.service.delivery import Delivery
+
 AlertKind = Literal["backup", "disk"]
 
 #: One row for each alert whose cause is still there.
@@ -53,11 +55,19 @@ class Alert:
 class Alerts(Part):
     """The alerts of a database."""
 
-    def begin(self, kind: AlertKind, problem: Sentence, targets: Sequence[str] = (), zone: str = "UTC") -> bool:
+    def begin(
+        self,
+        kind: AlertKind,
+        problem: Sentence,
+        targets: Sequence[str] = (),
+        zone: str = "UTC",
+        delivery: Delivery | None = None,
+    ) -> bool:
         """Note that something is wrong, and add a report to each of the ``targets``; False where it is known.
 
         A target is a mail address or the address of a webhook; without any, administrators whose names are mail
-        addresses get one. Reports have times of the ``zone``.
+        addresses get one. Those that ``delivery`` does not reach get none; None reaches all. Reports have times of the
+        ``zone``.
         """
         with self.session.read() as connection:
             if kind in connection.execute(sa.select(_A.kind)).scalars().all():
@@ -75,7 +85,10 @@ class Alerts(Part):
                 "known": {"sentence_values": problem.to_json()},
             }
             note(connection, now, "alert.begin", kind, problem=str(problem))
-            add_reports(connection, now, None, now, kind, _channels(targets or _administrators(connection)), content)
+            reached = targets or _administrators(connection)
+            if delivery is not None:
+                reached = [target for target in reached if delivery.reaches(target)]
+            add_reports(connection, now, None, now, kind, _channels(reached), content)
             return True
 
     def end(self, kind: AlertKind) -> bool:

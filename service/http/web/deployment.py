@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import logging
 import threading
-from contextlib import suppress
+from collections import Counter
 from contextvars import copy_context
 from dataclasses import dataclass
+from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from sprag_study.sentences import Sentence
 from sprag_study.service.http.problems import ApiError
 from sprag_study.service.http.schedule_views import listed
-from sprag_study.service.jobs.maintenance import backups, make_backup
-from sprag_study.service.jobs.nights import night
-from sprag_study.service.languages import recorded
+from sprag_study.service.jobs.dispatching import worker_settings
+from sprag_study.service.jobs.maintenance import alert, backup_failed, backups, make_backup
+from sprag_study.service.jobs.nights import whole_outcome
+from sprag_study.service.jobs.reports.watchdog import late_runs
 from sprag_study.service.storage.errors import StoreError
 
 if TYPE_CHECKING:
@@ -45,14 +47,17 @@ class Health:
 
 def schedule_health(store: Store) -> list[Health]:
     """Every schedule; first those that need attention, otherwise newest first."""
-    lately = night(store, HEALTH_DAYS * 24)
-    late = {run["schedule"] for run in lately["late"]}
-    found = []
-    for schedule in listed(store)["schedules"]:
-        runs = [run for run in lately["runs"] if run["schedule"] == schedule["id"]]
-        trouble = sum(run["outcome"]["trouble"] for run in runs)
-        found.append(Health(schedule, len(runs), trouble, schedule["id"] in late))
-    return sorted(found, key=lambda health: not (health.late or health.trouble))
+    until = store.clock.now()
+    runs, trouble = Counter[str](), Counter[str]()
+    for run in store.runs.between(until - timedelta(days=HEALTH_DAYS), until):
+        runs[run.schedule] += 1
+        trouble[run.schedule] += whole_outcome(store, run).trouble
+    late = {late.run.id for late in late_runs(store)}
+    health = [
+        Health(schedule, runs[schedule["id"]], trouble[schedule["id"]], schedule["id"] in late)
+        for schedule in listed(store)["schedules"]
+    ]
+    return sorted(health, key=lambda item: not (item.late or item.trouble))
 
 
 def backups_listed(folder: str) -> list[tuple[datetime, str, int]]:
@@ -71,22 +76,24 @@ def is_being_backed_up() -> bool:
 
 def begin_backup(context: Context) -> None:
     """Begin a backup in a thread; raises ApiError where there can be none. One that is being made is enough."""
-    folder, store = context.settings.backup_folder, context.store
-    if not folder or store.session.on_server:
+    settings, store = worker_settings(context.settings), context.store
+    plan, folder = settings.maintenance, settings.maintenance.folder
+    if store.session.on_server:
+        text = Sentence("No backups are made of a database on a server: use PostgreSQL's own tools, such as pg_dump.")
+        raise ApiError("not-found", text)
+    if folder is None:
         raise ApiError("not-found", Sentence("No backups are made here: SPRAG_BACKUP_FOLDER is not set."))
     if not _MAKING.acquire(blocking=False):
         return
 
     def make() -> None:
         try:
-            path = make_backup(store, Path(folder).expanduser(), store.clock.now())
+            path = make_backup(store, folder, store.clock.now())
             store.audit.note("database.backup", path.name, bytes=path.stat().st_size)
-            store.alerts.end("backup")
+            alert(store, plan, settings.delivery, "backup", None)
         except (StoreError, OSError) as error:
             _LOG.error("A backup failed: %s", error)
-            problem = Sentence(recorded.BACKUP_FAILED, problem=str(error).removesuffix("."))
-            with suppress(StoreError):
-                store.alerts.begin("backup", problem, context.settings.alert_to, context.settings.zone)
+            alert(store, plan, settings.delivery, "backup", backup_failed(error))
         finally:
             _MAKING.release()
 

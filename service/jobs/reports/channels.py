@@ -16,9 +16,8 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag_study.sentences import Amount, Sentence
-from sprag_study.service.delivery import origin_of
+from sprag_study.service.delivery import in_domains, origin_of
 from sprag_study.service.languages import N_
-from sprag_study.service.schedules.report_to import mail_allowed
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -51,7 +50,7 @@ def send_mail(message: EmailMessage, delivery: Delivery, context: ssl.SSLContext
     server = delivery.mail_server
     if server is None:
         raise DeliveryError(Sentence("No mail server is set (SPRAG_SMTP_URL)."))
-    if not mail_allowed(str(message["To"]), delivery):
+    if not in_domains(str(message["To"]), delivery.domains):
         raise DeliveryError(
             Sentence("{address} has a domain to which no reports go (SPRAG_MAIL_DOMAINS).", address=str(message["To"]))
         )

@@ -362,8 +362,8 @@ class Runs(Part):
                 add_reports(connection, now, run.schedule, due, "run", to.targets, content)
         return bool(concluded.rowcount)
 
-    def between(self, since: datetime, until: datetime, most: int) -> list[NightRun]:
-        """Due times from ``since`` until ``until``, also of deleted schedules, latest first."""
+    def between(self, since: datetime, until: datetime, most: int | None = None) -> list[NightRun]:
+        """Due times from ``since`` until ``until``, also of deleted schedules: the latest ``most``, latest first."""
         query = (
             sa.select(_S.id.label("schedule_id"), _S.name.label("schedule_name"), _S.zone, _S.trouble_flags, *COLUMNS)
             .select_from(runs_with_studies().join(SCHEDULES, _S.number == _R.schedule))

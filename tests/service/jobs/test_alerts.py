@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import errno
 import json
 import shutil
 from collections import namedtuple
@@ -14,7 +15,7 @@ import pytest
 from pydantic import ValidationError
 
 from sprag_study.service.actor import Role
-from sprag_study.service.delivery import Delivery, origin_of
+from sprag_study.service.delivery import Delivery, MailServer, origin_of
 from sprag_study.service.jobs.dispatching import worker_settings
 from sprag_study.service.jobs.maintenance import Maintenance, MaintenancePlan
 from sprag_study.service.jobs.reports.reporter import Reporter
@@ -114,6 +115,37 @@ def test_a_backup_that_fails_is_said_to_administrators_who_have_an_address(store
     assert store.alerts.present() == ()
 
 
+@pytest.mark.parametrize("office", [Delivery(), Delivery(mail_server=MailServer("m", 25, "none"), domains=("x.org",))])
+def test_nothing_waits_for_administrators_whom_no_mail_reaches(
+    store: Store, disk: Callable[[float], None], office: Delivery
+) -> None:
+    store.people.add_user("dora@example.com", Role.ADMINISTRATOR)
+    disk(0)
+    Maintenance(store, MaintenancePlan(least_free=GB), delivery=office).look()
+    assert len(store.alerts.present()) == 1
+    assert waiting(store) == []
+
+
+def test_a_folder_that_cannot_be_looked_at_stops_neither_backup_nor_alert(
+    store: Store, disk: Callable[[float], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, gone = tmp_path / "b", PermissionError(errno.EACCES, "Permission denied")
+    is_dir = Path.is_dir
+
+    def looked_at(path: Path) -> bool:
+        if path == store.session.path.parent:
+            raise gone
+        return is_dir(path)
+
+    monkeypatch.setattr(Path, "is_dir", looked_at)
+    folder.mkdir()
+    disk(0)
+    Maintenance(store, MaintenancePlan(folder, least_free=GB)).look()
+    assert [alert.kind for alert in store.alerts.present()] == ["disk"]
+    assert str(folder) in store.alerts.present()[0].problem
+    assert len(list(folder.glob("sprag-*.sqlite3"))) == 1
+
+
 def test_alerts_are_mails_and_webhooks_in_the_language_of_the_office(
     store: Store, disk: Callable[[float], None], tmp_path: Path
 ) -> None:
@@ -166,12 +198,31 @@ def test_alerts_stand_on_the_page_and_the_doctor_finds_them(
     assert (finding["ok"], "500 MB are free" in finding["detail"]) == (False, True)
 
 
+def test_the_doctor_takes_any_disk_where_none_is_watched(
+    service: Service,
+    sprag: Callable[..., Any],
+    settings: Settings,
+    disk: Callable[[float], None],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    disk(0.5 * GB)
+    for least, ok in (("1024", False), ("0", True)):
+        monkeypatch.setenv("SPRAG_DISK_FREE", least)
+        done = sprag("admin", "doctor", "--json", "--db", settings.database)
+        assert [it["ok"] for it in done.data["findings"] if it["subject"] == "disk"] == [ok]
+
+
 def test_settings_say_who_is_told_and_when(settings: Settings) -> None:
     key = "whsec_" + base64.b64encode(b"k" * 32).decode()
     hooks = {"webhook_origins": "https://hooks.example", "webhook_secret": key}
-    given = Settings(disk_free=10, alert_to="ada@example.com, https://hooks.example/x", **hooks)
+    mails = {"smtp_url": "smtps://mail.example", "mail_from": "sprag@example.com", "mail_domains": "example.com"}
+    given = Settings(disk_free=10, alert_to="ada@example.com, https://hooks.example/x", **hooks, **mails)
     plan = worker_settings(given).maintenance
     assert (plan.least_free, plan.alert_to) == (10 * 2**20, ("ada@example.com", "https://hooks.example/x"))
     for wrong in ("ada", "https://elsewhere.example/x", "http://169.254.169.254/"):
         with pytest.raises(ValidationError):
-            Settings(alert_to=wrong, **hooks)
+            Settings(alert_to=wrong, **hooks, **mails)
+    with pytest.raises(ValidationError, match="SPRAG_SMTP_URL"):
+        Settings(alert_to="ada@example.com")
+    with pytest.raises(ValidationError, match="SPRAG_MAIL_DOMAINS"):
+        Settings(alert_to="ada@elsewhere.example", **mails)

@@ -14,8 +14,12 @@ import httpx
 import pytest
 from pydantic import SecretStr
 
+from sprag_study.service.http.problems import ApiError
+from sprag_study.service.http.web.deployment import begin_backup, schedule_health
+from sprag_study.service.jobs import nights
 from sprag_study.service.jobs.settings_log import note_settings
 from sprag_study.service.settings import Settings, effective
+from sprag_study.service.storage.database.session import Session
 from sprag_study.service.storage.part import micros_of
 from sprag_study.service.storage.people.audit import AuditFilter
 from sprag_study.service.storage.schedules.runs import RunState
@@ -76,6 +80,25 @@ def test_a_backup_that_fails_is_an_alert(opened: Callable[..., Office], service:
     assert "A backup of the database failed" in ada.get("/me/workers").text
 
 
+def test_a_backup_that_fails_in_a_copy_is_no_alert(
+    opened: Callable[..., Office], service: Service, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setattr(service.store.deployment, "is_copy", lambda: True)
+    opened(backup_folder=str(tmp_path / "file")).program("ada").post("/me/backups", headers=OWN)
+    ended(service)
+    assert service.store.alerts.present() == ()
+
+
+def test_of_a_server_it_says_that_it_has_tools_of_its_own(
+    opened: Callable[..., Office], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    context = opened(backup_folder=str(tmp_path)).app.state.context
+    monkeypatch.setattr(Session, "on_server", True)
+    with pytest.raises(ApiError, match="use PostgreSQL's own tools"):
+        begin_backup(context)
+
+
 def test_without_a_folder_there_is_no_backup(opened: Callable[..., Office]) -> None:
     ada = opened().program("ada")
     assert "Make a backup now" not in ada.get("/me/workers").text
@@ -112,6 +135,21 @@ def test_the_page_of_the_log_shows_a_setting_by_its_name_and_an_empty_value(serv
         '<code translate="no">backup_folder</code>: <span translate="no">empty</span> → '
         '<span translate="no">/srv/backups</span>'
     ) in page
+
+
+def test_every_run_of_the_last_days_is_counted(service: Service) -> None:
+    service.http.post("/api/v1/schedules", json={"spec": SPEC, "cron": "*/10 * * * *", "name": "often"})
+    number = next(record.number for record in service.store.schedules.all())
+    now = micros_of(service.store.clock.now())
+    runs = [
+        {"schedule": number, "due": now - minute * 60_000_000, "state": RunState.SKIPPED.value, "missed": 0,
+         "begun_at": now, "unbound": 0, "problem": "the one before still ran"}
+        for minute in range(1, nights.MOST_RUNS + 8)
+    ]  # fmt: skip
+    with service.store.session.write() as connection:
+        connection.execute(SCHEDULE_RUNS.insert(), runs)
+    (health,) = schedule_health(service.store)
+    assert (health.runs, health.trouble) == (nights.MOST_RUNS + 7, nights.MOST_RUNS + 7)
 
 
 def test_settings_that_changed_since_the_last_start_are_in_the_log(service: Service) -> None:
