@@ -206,6 +206,13 @@ def test_benchmarks_are_called_as_modules() -> None:
         assert not re.search(r"python benchmarks/", page.read_text()), page
 
 
+def test_each_decision_has_a_number_of_its_own() -> None:
+    numbers = [path.name[:4] for path in (ROOT / "docs" / "adr").glob("[0-9]*.md")]
+    assert sorted(set(numbers)) == sorted(numbers)
+    for path in (ROOT / "docs" / "adr").glob("[0-9]*.md"):
+        assert path.read_text(encoding="utf-8").startswith(f"# {path.name[:4]}. "), path.name
+
+
 def test_the_newest_version_of_the_change_log_is_that_of_the_project() -> None:
     headings = re.findall(r"(?m)^## (.+)$", (ROOT / "CHANGELOG.md").read_text("utf-8"))
     assert headings[0] == "Unreleased"
