@@ -14,17 +14,16 @@ import httpx
 import pytest
 from pydantic import SecretStr
 
-from sprag_study.service.http.problems import ApiError
-from sprag_study.service.http.web.deployment import begin_backup, schedule_health
+from sprag_study.service.http.web.deployment import schedule_health
 from sprag_study.service.jobs import nights
 from sprag_study.service.jobs.settings_log import note_settings
 from sprag_study.service.settings import Settings, effective
-from sprag_study.service.storage.database.session import Session
 from sprag_study.service.storage.part import micros_of
 from sprag_study.service.storage.people.audit import AuditFilter
 from sprag_study.service.storage.schedules.runs import RunState
 from sprag_study.service.storage.schedules.tables import SCHEDULE_RUNS
 from sprag_study.service.storage.store import Store
+from tests.service.conftest import in_process
 from tests.service.http.people import OWN, Office
 from tests.service.timed_spec import SPEC
 
@@ -90,13 +89,15 @@ def test_a_backup_that_fails_in_a_copy_is_no_alert(
     assert service.store.alerts.present() == ()
 
 
-def test_of_a_server_it_says_that_it_has_tools_of_its_own(
-    opened: Callable[..., Office], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_of_a_server_it_says_that_postgresql_has_tools_of_its_own(
+    settings: Settings, postgres_url: str, connect: Callable[..., httpx.Client], tmp_path: Path
 ) -> None:
-    context = opened(backup_folder=str(tmp_path)).app.state.context
-    monkeypatch.setattr(Session, "on_server", True)
-    with pytest.raises(ApiError, match="use PostgreSQL's own tools"):
-        begin_backup(context)
+    given = settings.model_copy(update={"database": postgres_url, "backup_folder": str(tmp_path)})
+    with in_process(given, connect) as service:
+        assert "PostgreSQL has its own tools" in service.http.get("/me/workers").text
+        refused = service.http.post("/me/backups", headers=OWN)
+    assert refused.status_code == 404
+    assert "use PostgreSQL's own tools, such as pg_dump" in refused.json()["detail"]
 
 
 def test_without_a_folder_there_is_no_backup(opened: Callable[..., Office]) -> None:
