@@ -65,20 +65,20 @@ def _drawing(base: Mapping[str, float], number: int, several: bool, *, first: bo
         _base(base, arrows, scale),
     ]
     dimensions = [
-        Dimension(f"{prefix}spring_rate", "", (_WALL + spring_at[0]) / 2, spring_at[1] - 9, "left", (0.0, -9.0)),
+        Dimension(f"{prefix}spring_rate", "", (_WALL + spring_at[0]) / 2, spring_at[1], "left", (0.0, -18.0)),
         Dimension(f"{prefix}mass", "", mass_at[0] - 14, mass_at[1] - 10, "left", on="arm"),
         Dimension(f"{prefix}inertia", "", *_on_arm(y, 0.42 * arm * scale), "left", on="arm"),
         Dimension(f"{prefix}spring_arm", "", *_beside(y, spring_arm * scale, 0.78, 46.0), "right", on="arm"),
         Dimension(f"{prefix}arm", "", *_beside(y, arm * scale, 0.62, 30.0), "right", on="arm"),
-        Dimension(f"{prefix}backlash", "", _AXIS + _WHEEL - 2, y - 12, "right", on="base"),
+        Dimension(f"{prefix}backlash", "", _AXIS + _WHEEL - 2, y - 12, "right", (24.0, -4.0), on="base"),
     ]
     if first:
         dimensions += [
             Dimension("excitation.frequency", "", 70.0, arrows - 22, "left"),
             Dimension("excitation.amplitude_x", "", 62.0, arrows, "left"),
             Dimension("excitation.amplitude_y", "", 76.0, arrows + 20, "left"),
-            Dimension("shaft.inertia", "", _AXIS + 9, y + 9, "right", (_WHEEL - 6, 17.0), on="base"),
-            Dimension("shaft.load", "", _AXIS + 36, y + 26, "right"),
+            Dimension("shaft.inertia", "", _AXIS + 9, y + 9, "right", (6.0 - _WHEEL - _SHAFT, 28.0), on="base"),
+            Dimension("shaft.load", "", _AXIS + 39, y + 16, "right", (8.0, 0.0)),
         ]
     title = (
         gettext("Pendulum {number}", number=ordinal(number))

@@ -26,10 +26,14 @@ STEP: Final = 5
 #: Largest width and height of a drawing, and its margin.
 _WIDTH, _HEIGHT, _MARGIN = 420.0, 260.0, 24.0
 _ROUNDED: Final = 1
+#: Name of the angle of the guides.
+_INCLINATION: Final = "inclination"
 #: From a bar to the middle of a letter beside it (px).
 _BESIDE: Final = 14.0
 #: Of the train: distance of two shafts, height of its axis, and the largest radius of a wheel (px).
 _APART, _LEVEL, _LARGE = 84.0, 58.0, 30.0
+#: From the top of a part of the train to the middle of its letter (px).
+_ABOVE: Final = (0.0, -9.0)
 _STAGES: Final = {
     "gear": N_("gear"), "worm": N_("worm gear"), "belt": N_("belt"), "chain": N_("chain"), "screw_nut": N_("screw"),
     "rack": N_("rack"),
@@ -89,14 +93,15 @@ def _drawing(title: str, sketch: machine_shaft.Sketch, at: str, kind: str, large
         "joints": {name: points[:-1].tolist() for name, points in joints.items()},
         "turns": {name: values[:-1].tolist() for name, values in turns.items()},
     }
+    guides = [placed(line) for line in sketch.guides]
     width, height = (round(float(own) * scale + 2.0 * _MARGIN, 1) for own in span)
     return Drawing(
         title,
         gettext("Drawing of the mechanism: {title}", title=title.lower()),
         width,
         height,
-        "".join(_shapes(sketch, joints, turns, [placed(line) for line in sketch.guides], scale)),
-        tuple(_dimensions(sketch, joints, f"{at}.{kind}.", width, scale)),
+        "".join(_shapes(sketch, joints, turns, guides, scale)),
+        tuple(_dimensions(sketch, joints, guides, f"{at}.{kind}.", width, scale)),
         json.dumps(frames, separators=(",", ":")),
         at,
     )
@@ -133,11 +138,12 @@ def _shapes(
 
 
 def _dimensions(
-    sketch: machine_shaft.Sketch, joints: dict[str, Floats], prefix: str, width: float, scale: float
-) -> Iterator[Dimension]:
+    sketch: machine_shaft.Sketch, joints: dict[str, Floats], guides: list[Floats], prefix: str, width: float,
+    scale: float,
+) -> Iterator[Dimension]:  # fmt: skip
     """The numbers that bars and plates stand for: along each bar, and one below the other in a plate.
 
-    Their letters are beside the bar, and beside the plate.
+    Their letters are beside the bar, and beside the plate. The inclination of a plate is that of its guides.
     """
     for bar in sketch.bars:
         first, last = joints[bar.joints[0]][-1], joints[bar.joints[-1]][-1]
@@ -153,10 +159,21 @@ def _dimensions(
         own = [name for name in plate.about if name not in known]
         known |= set(own)
         half = float(np.abs(plate.outline[:, 0]).max()) * scale + _BESIDE / 2
+        if guides and _INCLINATION in own:
+            own.remove(_INCLINATION)
+            yield _at_end(f"{prefix}{_INCLINATION}", guides, joints["O"][-1], width)
         for index, name in enumerate(own):
             dimension = _at(f"{prefix}{name}", float(x), float(y) + 15.0 * index, width)
             apart = (-half if dimension.side == "left" else half, 0.0)
             yield replace(dimension, apart=apart, on=f"{plate.joint} {plate.joint} 0 {15 * index}")
+
+
+def _at_end(path: str, guides: list[Floats], shaft: Floats, width: float) -> Dimension:
+    """A number of the guides, at their end that is farthest from the shaft."""
+    ends = np.concatenate([line[[0, -1]] for line in guides])
+    x, y = ends[int(np.argmax(np.hypot(*(ends - shaft).T)))]
+    dimension = _at(path, float(x), float(y), width)
+    return replace(dimension, apart=(-_BESIDE if dimension.side == "left" else _BESIDE, 0.0))
 
 
 def _across(along: Floats, side: str) -> tuple[float, float]:
@@ -186,11 +203,13 @@ def _train(structure: Mapping[str, Any], base: Mapping[str, float]) -> Iterator[
         x = 70.0
         shapes.append(_box(x - 30.0, gettext("Motor")))
         names = [path for path in base if path.startswith("drive.motor.")]
-        dimensions += [Dimension(path, "", x - 30.0, _LEVEL - 26.0, "right") for path in names[:1]]
+        dimensions += [Dimension(path, "", x - 30.0, _LEVEL - 18.0, "right", _ABOVE) for path in names[:1]]
     for index, kind in enumerate(stages):
-        shapes += [_line(x, x + _APART), *_stage(kind, x + _APART / 2, base.get(f"drive.stages.{index}.ratio", 1.0))]
+        wheels = _wheels(kind, x + _APART / 2, base.get(f"drive.stages.{index}.ratio", 1.0))
+        shapes += [_line(x, x + _APART), *_stage(kind, x + _APART / 2, wheels)]
         name = next((own for own in ("ratio", "lead", "radius") if f"drive.stages.{index}.{own}" in base), "inertia")
-        dimensions.append(Dimension(f"drive.stages.{index}.{name}", "", x + _APART / 2 - 4, 12.0, "right"))
+        place, radius = max(wheels, key=lambda wheel: wheel[1])
+        dimensions.append(Dimension(f"drive.stages.{index}.{name}", "", place, _LEVEL - radius, "right", _ABOVE))
         x += _APART
     end = x + _APART
     shapes.append(_line(x, end))
@@ -216,13 +235,18 @@ def _box(x: float, title: str) -> str:
     )
 
 
-def _stage(kind: str, x: float, ratio: float) -> Iterator[str]:
-    """Two wheels of a stage; belts and chains go round both."""
+def _wheels(kind: str, x: float, ratio: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Places along the shaft and radii of the two wheels of a stage (px)."""
     share = ratio if math.isfinite(ratio) and ratio > 0.0 else 1.0
     small, large = (_LARGE / share, _LARGE) if share >= 1.0 else (_LARGE, _LARGE * share)
     small, large = (max(own, 6.0) for own in (small, large))
     apart = (small + large) / 2 if kind in {"gear", "worm"} else 22.0
-    left, right = x - apart, x + apart
+    return (x - apart, small), (x + apart, large)
+
+
+def _stage(kind: str, x: float, wheels: tuple[tuple[float, float], tuple[float, float]]) -> Iterator[str]:
+    """Two wheels of a stage; belts and chains go round both."""
+    (left, small), (right, large) = wheels
     yield f'<circle class="wheel" cx="{left:g}" cy="{_LEVEL:g}" r="{small:g}"/>'
     yield f'<circle class="wheel" cx="{right:g}" cy="{_LEVEL:g}" r="{large:g}"/>'
     if kind in {"belt", "chain"}:

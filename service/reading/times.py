@@ -26,8 +26,11 @@ def _weekday(day: int) -> str:
     )[day]
 
 
-def when(moment: datetime, now: datetime, zone: str) -> str:
-    """``today 11:14``, ``yesterday 17:02``, ``Mon 09:26`` within a week, otherwise the date and the time."""
+def when(moment: datetime, now: datetime, zone: str, *, seconds: bool = False) -> str:
+    """``today 11:14``, ``yesterday 17:02``, ``Mon 09:26`` within a week, otherwise the date and the time.
+
+    ``seconds`` adds those of the time.
+    """
     own, here = moment.astimezone(ZoneInfo(zone)), now.astimezone(ZoneInfo(zone))
     days = (own.date() - here.date()) // timedelta(days=1)
     if days in _DAYS:
@@ -36,7 +39,7 @@ def when(moment: datetime, now: datetime, zone: str) -> str:
         day = _weekday(own.weekday())
     else:
         day = own.strftime(date_format())
-    return f"{day} {own:%H:%M}"
+    return f"{day} {own:%H:%M:%S}" if seconds else f"{day} {own:%H:%M}"
 
 
 def in_full(moment: datetime, zone: str) -> str:

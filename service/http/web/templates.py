@@ -19,8 +19,6 @@ from starlette.responses import Response
 from sprag_study.sentences import Sentence, WarningText
 from sprag_study.service import languages
 from sprag_study.service.actor import Role
-from sprag_study.service.figures.drawing import Drawing
-from sprag_study.service.figures.drawing import svg as drawing_svg
 from sprag_study.service.http.current import current
 from sprag_study.service.http.prefix import here
 from sprag_study.service.http.reading import file_read_as
@@ -148,7 +146,6 @@ def _templates() -> Environment:
         "bytes": bytes_text,
         "query": urlencode,
         "here": here,
-        "drawn": drawn,
         "embedded": embedded,
     }
     environment.globals["sheet_of"] = sheet_of
@@ -245,22 +242,17 @@ def spec_text(spec: dict[str, Any]) -> str:
     return json.dumps(spec, ensure_ascii=False, indent=2)
 
 
-def drawn(drawing: Drawing) -> Markup:
-    """A drawing of a machine, whose texts are escaped where it is made."""
-    return Markup(drawing_svg(drawing))  # noqa: S704
-
-
 def marked(text: str) -> Markup:
     """A sentence of the documentation; text between backticks is code."""
     return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))  # noqa: S704 - escaped just before
 
 
-def moment(given: str | datetime | None) -> Markup:
-    """A time for the reader, ``today 11:14``, with all of it as its title."""
+def moment(given: str | datetime | None, *, seconds: bool = False) -> Markup:
+    """A time for the reader, ``today 11:14``, or to the second, with all of it as its title."""
     if not given:
         return Markup("–")
     at, zone = datetime.fromisoformat(given) if isinstance(given, str) else given, current().zone
-    short, full = times.when(at, datetime.now(UTC), zone), times.in_full(at, zone)
+    short, full = times.when(at, datetime.now(UTC), zone, seconds=seconds), times.in_full(at, zone)
     return Markup('<time datetime="{}" title="{}">{}</time>').format(at.isoformat(timespec="seconds"), full, short)
 
 

@@ -394,7 +394,7 @@ def test_warnings_have_the_meaning_of_their_code_before_their_sentence() -> None
 
 def test_exit_codes_and_durations_in_ukrainian() -> None:
     with languages.language("uk"):
-        assert ExitCode.NOT_ALL_OK.sentence == "деякі випадки не завершилися ok, або щось із ночі потребує уваги"
+        assert ExitCode.NOT_ALL_OK.sentence == "деякі випадки не завершилися успішно, або щось із ночі потребує уваги"
         assert [duration_text(s) for s in (0.42, 12.0, 200.0, 7500.0)] == ["0,4 с", "12 с", "3 хв 20 с", "2 год 05 хв"]
 
 

@@ -18,6 +18,9 @@ from sprag_study.service.presets import preset_names
 from sprag_study.service.spec.document import parse_spec
 from sprag_study.worker.study import Study
 
+#: Place and radius of a wheel.
+_CIRCLE = r'<circle class="wheel"[^>]*? cx="([\d.]+)" cy="([\d.]+)" r="([\d.]+)"'
+
 
 def _study(name: str) -> Study:
     return parse_spec(preset_of(name)["spec"]).study
@@ -63,8 +66,37 @@ def test_letters_of_a_mechanism_are_beside_its_bars(name: str) -> None:
             if drawing.frames:
                 assert each.apart is not None
                 assert math.hypot(*each.apart) > 10.0
-            else:
-                assert f'data-mark="{each.path}"' in svg(drawing, {each.path: "1 mm"})
+
+
+def test_lines_of_a_train_end_at_the_top_of_a_wheel() -> None:
+    train, _mechanism = drawings(_study("punching_press"))
+    tops = {(float(x), float(y) - float(r)) for x, y, r in re.findall(_CIRCLE, train.shapes)}
+    stages = [each for each in train.dimensions if each.path.startswith("drive.stages.")]
+    assert len(stages) == 2
+    assert {(each.x, each.y) for each in stages} <= tops
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_the_line_of_an_inclination_ends_at_a_guide(name: str) -> None:
+    for drawing in drawings(_study(name)):
+        for each in drawing.dimensions:
+            guides = re.findall(r'class="dashed" points="([^"]*)"', drawing.shapes)
+            if guides and each.path.endswith(".inclination") and not each.on:
+                assert f"{each.x:g},{each.y:g}" in " ".join(guides).split()
+            elif guides:
+                assert not each.path.endswith(".inclination") or ".cam." in each.path
+
+
+def test_letters_of_a_drive_lie_neither_on_its_wheel_nor_on_each_other() -> None:
+    (drawing,) = drawings(_study("one_pendulum"))
+    places = {each.path: (each.x + each.apart[0], each.y + each.apart[1]) for each in drawing.dimensions if each.apart}
+    x, y, radius = next(tuple(map(float, own)) for own in re.findall(_CIRCLE, drawing.shapes))
+    beside = {"pendulums.0.backlash", "shaft.inertia", "shaft.load"}
+    assert beside <= set(places)
+    assert all(math.dist(places[path], (x, y)) > radius + 4.0 for path in beside)
+    assert all(math.dist(places[one], places[other]) > 18.0 for one in beside for other in beside - {one})
+    spring = next(each for each in drawing.dimensions if each.path == "pendulums.0.spring_rate")
+    assert re.search(rf'translate\([\d.]+ {spring.y:g}\)"><path class="body" data-spring', drawing.shapes)
 
 
 def test_ends_of_lines_know_what_they_move_with() -> None:

@@ -41,7 +41,7 @@ def test_a_mail_is_in_the_language_of_the_service() -> None:
     assert text is not None
     assert page is not None
     lines = text.get_content().splitlines()
-    assert lines[0] == "Закінчено: готово 12\u202f000 з 12\u202f000 випадків, з них 11\u202f970 завершилися ok."
+    assert lines[0] == "Закінчено: готово 12\u202f000 з 12\u202f000 випадків, з них 11\u202f970 завершилися успішно."
     assert "Завершення «деренчання»: 3 випадки" in lines
     assert OUTCOME.sentence not in text.get_content()
     assert '<html lang="uk">' in page.get_content()

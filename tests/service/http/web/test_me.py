@@ -39,6 +39,7 @@ def test_times_are_those_of_the_clock_on_the_wall(moment: str, english: str, ukr
     assert when(own, NOW, "Europe/Kyiv") == english
     with language("uk"):
         assert when(own, NOW, "Europe/Kyiv") == ukrainian
+    assert when(own, NOW, "Europe/Kyiv", seconds=True) == f"{english}:00"
     assert in_full(own, "Europe/Kyiv").endswith(", Europe/Kyiv")
 
 
