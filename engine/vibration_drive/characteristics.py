@@ -6,9 +6,9 @@ from numpy.typing import NDArray
 from sprag_study.engine.vibration_drive.cases import (
     Column,
     PendulumColumn,
-    has_backstop,
     pendulum_column,
     stop_column,
+    unloaded,
 )
 from sprag_study.engine.vibration_drive.layout import OUT_EVENTS, OUT_RUNUP, OUT_STEPS, OUT_SUMS, Layout
 from sprag_study.engine.vibration_drive.regimes import keeps_windup
@@ -205,25 +205,26 @@ def _over_pendulums(cases: _Cases, out: dict[str, Floats], name: str) -> Floats:
 
 def _shaft(cases: _Cases, out: dict[str, Floats]) -> None:
     turn = cases.shaft("turn_2") - cases.shaft("turn_0")
+    lowest, highest = cases.shaft("speed_min"), cases.shaft("speed_max")
+    # Where anything resists it the shaft never turns back: a negative speed is a rounding error about a standstill.
+    resisted = ~unloaded(cases.matrix, cases.lay.n)
+    lowest, highest = (np.where(resisted & (speed < 0.0), 0.0, speed) for speed in (lowest, highest))
     # Within its extrema in spite of rounding: the mean of a steady speed is that speed.
-    mean = np.clip(turn / cases.length, cases.shaft("speed_min"), cases.shaft("speed_max"))
+    mean = np.clip(turn / cases.length, lowest, highest)
     out["shaft.speed.mean"] = mean
-    out["shaft.speed.max"] = cases.shaft("speed_max")
-    # Under a load the shaft never turns back: a negative minimum is a rounding error at the instant it stops.
-    lowest = cases.shaft("speed_min")
-    stops = (cases.load > 0.0) | has_backstop(cases.matrix, cases.lay.n)
-    out["shaft.speed.min"] = np.where(stops & (lowest < 0.0), 0.0, lowest)
-    out["shaft.irregularity"] = _ratio(cases.shaft("speed_max") - out["shaft.speed.min"], mean)
+    out["shaft.speed.max"] = highest
+    out["shaft.speed.min"] = lowest
+    out["shaft.irregularity"] = _ratio(highest - lowest, mean)
     out["shaft.turn"] = turn
     out["shaft.acceleration.max"] = cases.shaft("acc_max")
     out["torque.mean"] = _over_pendulums(cases, out, "torque.mean")
     out["torque.max"] = cases.shaft("sum_max") if cases.lay.n > 1 else cases.pendulum(0, "torque_max")
-    square, cube, largest = cases.shaft("speed_square"), cases.shaft("speed_cube"), cases.shaft("speed_max")
+    square, cube = cases.shaft("speed_square"), cases.shaft("speed_cube")
     out["power.bearing.mean"] = cases.bearing * square / cases.length
     out["power.linear.mean"] = cases.linear * square / cases.length
     out["power.quadratic.mean"] = cases.quadratic * cube / cases.length
     out["power.useful.mean"] = cases.load * mean + (out["power.linear.mean"] + out["power.quadratic.mean"])
-    out["power.useful.max"] = cases.work_against_load(largest, np.square(largest), largest * np.square(largest))
+    out["power.useful.max"] = cases.work_against_load(highest, np.square(highest), highest * np.square(highest))
     out["power.clutch.mean"] = cases.shaft("work_clutch") / cases.length
     out["power.clutch.max"] = cases.shaft("power_max")
     out["power.input.mean"] = _over_pendulums(cases, out, "power.input")

@@ -128,7 +128,10 @@ def collect_guards(W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, blocks
     """
     fresh = W[lay.steps, lane] == Z[lane, SKIP_STEP]
     shaft = Z[lane, SHAFT_STATE]
-    if not W[lay.m_sum_high if shaft == HELD else lay.m_speed_low, lane] > 0.0:
+    # Clutches that overrun or take up their backlash never push: without a dry load their drag vanishes as an
+    # interaction starts, and rounding would decide whether that frees the shaft.
+    idle = lay.drag == 1 and shaft == HELD and not W[lay.driven, lane] > 0.0
+    if not (idle or W[lay.m_sum_high if shaft == HELD else lay.m_speed_low, lane] > 0.0):
         if shaft == HELD:
             total(W, lay, lane, g)
             for k in range(lay.order + 1):

@@ -182,7 +182,7 @@ def set_shaft(W: Floats, Z: Ints, lay: Layout, lane: int, state: int) -> None:
     Z[lane, SHAFT_STATE] = state
     W[lay.rotating, lane] = 1.0 if state == ROTATING else 0.0
     W[lay.sum_high, lane] = load if state == HELD else NEVER
-    # Without a load nothing slows down the shaft, so it is never held.
+    # Torques that depend on speeds vanish at rest: without a dry load and a backstop a shaft stops only in the limit.
     W[lay.speed_low, lane] = 0.0 if state == ROTATING and is_held(W, lay, lane) else -NEVER
     _set_mobility(W, Z, lay, lane)
 

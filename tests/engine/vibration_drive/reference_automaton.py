@@ -30,7 +30,8 @@ class Automaton(Machine):
         """Functions that are positive until their event, each with what the event does (docs/theory.md)."""
         n = self.n
         if self.shaft_state == "held":
-            yield lambda t, y: self.load - sum(self.torques(t, y)[0]), lambda y, t: self.turn("rotating")
+            if self.is_pushed():
+                yield lambda t, y: self.load - sum(self.torques(t, y)[0]), lambda y, t: self.turn("rotating")
         elif self.load > 0.0 or self.backstop:
             yield lambda t, y: y[self.shaft], self.stop
         for i, p in enumerate(self.pendulums):
@@ -70,6 +71,10 @@ class Automaton(Machine):
                     )
                 if self.literal:
                     yield UpwardCrossing(lead), lambda y, t, i=i: self.interact(i, y, t, crossing=True)
+
+    def is_pushed(self) -> bool:
+        """Whether any clutch may drive the shaft: one that overruns or takes up its backlash never does."""
+        return any(state not in ("free", "take_up") for state in self.clutches)
 
     def turn(self, state: str) -> None:
         self.shaft_state = state
@@ -130,7 +135,7 @@ class Automaton(Machine):
         """Transitions that the last one causes at once."""
         for _ in range(50):
             torque, _ = self.torques(t, y)
-            if self.shaft_state == "held" and sum(torque) > self.load + ROUNDING:
+            if self.shaft_state == "held" and self.is_pushed() and sum(torque) > self.load + ROUNDING:
                 self.shaft_state = "rotating"
             else:
                 for i, p in enumerate(self.pendulums):

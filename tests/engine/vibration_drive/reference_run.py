@@ -102,7 +102,8 @@ class Drive(Automaton):
                 return solver.y
             t, y = self.polish(solver.t_old, before, fired[0], fired[1])
             fired[2](y, t)
-            self.out.events += 1
+            # Those at t = 0 belong to the start.
+            self.out.events += t > 0.0
             if self.out.events > MOST_EVENTS:
                 raise Accumulating
             self.follow(y, t)

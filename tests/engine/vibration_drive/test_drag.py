@@ -12,8 +12,10 @@ from sprag_study.engine.endings import Ending
 from sprag_study.engine.run import Reset, Run, SettledRun, Span
 from sprag_study.engine.vibration_drive.parameters import DRAG
 from sprag_study.engine.vibration_drive.regimes import Regime, settled_infos
+from sprag_study.engine.vibration_drive.results import STEADY_SHAFT
 from sprag_study.engine.vibration_drive.settle import settle
 from sprag_study.engine.vibration_drive.simulate import trajectory
+from sprag_study.engine.vibration_drive.strobes import SHAFT_SPEED
 from tests.engine.odd_drives import odd_drive
 from tests.engine.vibration_drive.drive import Columns, Results, batch_of, clutch, column, drive, one, pendulum, periods
 from tests.engine.vibration_drive.test_against_scipy import compare
@@ -40,12 +42,20 @@ def damped(pendulums: int, seed: int, cases: int) -> list[Columns]:
     draw = np.random.default_rng(seed)
     machines = resisted(pendulums, seed, cases)
     for columns in machines:
-        columns["shaft.load"] = max(columns["shaft.load"], 0.02)
         for i in range(pendulums):
             columns[f"pendulums.{i}.clutch_damping"] = draw.choice(
                 [0.0, draw.uniform(0.0, 0.1), draw.uniform(0.1, 1.0)]
             )
             columns[f"pendulums.{i}.overrunning_damping"] = draw.choice([0.0, draw.uniform(0.0, 5e-3)])
+    return machines
+
+
+def dragged(pendulums: int, seed: int, cases: int) -> list[Columns]:
+    """Random machines whose clutches all drag while they overrun, so that each has a backstop."""
+    draw = np.random.default_rng(seed)
+    machines = damped(pendulums, seed, cases)
+    for columns in machines:
+        columns |= {f"pendulums.{i}.overrunning_damping": draw.uniform(1e-4, 5e-3) for i in range(pendulums)}
     return machines
 
 
@@ -190,6 +200,48 @@ def test_settled_motion_without_a_dry_load() -> None:
     for name in ("power.loss.mean", "power.useful.mean"):
         balance = balance - settled.values[:, names.index(name)]
     np.testing.assert_allclose(balance, 0.0, atol=1e-8)
+
+
+@pytest.mark.parametrize("pendulums", [1, 2])
+def test_a_backstop_without_a_dry_load_is_the_limit_of_a_small_one(pendulums: int) -> None:
+    """Drag that vanishes as an interaction starts does not free the shaft."""
+    cases = [columns | {"shaft.load": load} for load in (0.0, 1e-9) for columns in dragged(pendulums, 21, 24)]
+    settled = settle(batch_of(cases), SettledRun(), cases=len(cases))
+    bare, loaded = np.split(settled.regimes, 2)
+    np.testing.assert_array_equal(bare, loaded)
+    assert set(bare.tolist()) >= {Regime.HELD, Regime.PERIODIC}
+    names = [info.name for info in settled_infos(pendulums)]
+    repeats = settled.repeats[: len(bare)]
+    for name in ("regime.order", "clutches.engagements_per_period", "fraction.held"):
+        without, with_load = np.split(settled.values[:, names.index(name)], 2)
+        np.testing.assert_allclose(without[repeats], with_load[repeats], rtol=0.0, atol=1e-4, err_msg=name)
+
+
+@pytest.mark.parametrize("speed", [0.0, 30.0])
+def test_a_shaft_that_only_drag_resists_is_held_in_the_limit(speed: float) -> None:
+    """No clutch winds up, so that the shaft stands on the orbit, whatever rounding leaves of its speed."""
+    still = {"shaft.load": 0.0, "shaft.initial_speed": speed, "pendulums.0.backlash": 1.0}
+    cases = [
+        drive(1, **still, shaft__bearing_damping=bearing, shaft__linear_load=damping - bearing)
+        for damping in np.geomspace(3e-4, 0.1, 10)
+        for bearing in (0.0, damping)
+    ]
+    settled = settle(batch_of(cases), SettledRun(), cases=len(cases))
+    assert settled.regimes.tolist() == [Regime.HELD] * len(cases)
+    names = [info.name for info in settled_infos(1)]
+    shaft = {name: settled.values[:, names.index(name)] for name in STEADY_SHAFT}
+    for name, expected in STEADY_SHAFT.items():
+        np.testing.assert_array_equal(shaft[name], expected(0.0, 1.0), err_msg=name)
+    assert not settled.points[:, SHAFT_SPEED].any()
+
+
+def test_a_resisted_shaft_does_not_turn_back() -> None:
+    """A decayed speed has a rounding error of either sign."""
+    columns = drive(
+        1, shaft__load=0.0, shaft__bearing_damping=0.05, shaft__initial_speed=-1e-30, **pendulum(0, backlash=1.0)
+    )
+    row = one(columns, periods(4.0, 1.0, 4.0))
+    assert row["shaft.speed.min"] == row["shaft.speed.mean"] == row["shaft.speed.max"] == 0.0
 
 
 # Clutches with damping and drag, between a pendulum and a shaft that nothing else moves.
