@@ -96,7 +96,7 @@ def present() -> Mapping[str, str]:
 
 
 def digest() -> str:
-    """SHA-256 (hexadecimal) of `own`."""
+    """SHA-256 (hexadecimal) of `present`."""
     return digest_of(present())
 
 
