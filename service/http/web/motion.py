@@ -26,7 +26,7 @@ from sprag_study.service.http.threads import in_thread
 from sprag_study.service.http.views import study_address
 from sprag_study.service.http.web.figures.drawn import cases_of, drawn
 from sprag_study.service.http.web.figures.live import frames
-from sprag_study.service.http.web.sheet.machine import machine_of_case
+from sprag_study.service.http.web.sheet.machine import drawings_of_case
 from sprag_study.service.http.web.study import study_frame
 from sprag_study.service.http.web.templates import page, spec_text
 from sprag_study.service.http.web.view_forms import Asked, Seen, asked_of, fact_of, files_of, inline
@@ -242,7 +242,7 @@ def _page(
         parts={name: view.about.title for name, view in PARTS.items() if view.has(study)},
         opened=[(*one, files[place]) for place, one in enumerate(opened)],
         only=urlencode(only),
-        drawings=machine_of_case(study, frame["study"]["spec"], _own(study, case), reading, variant).drawings,
+        drawings=drawings_of_case(study, frame["study"]["spec"], _own(study, case), reading, variant),
         spec=spec_text(design_spec(frame["study"]["spec"], study, case)),
         goes_on=models.has_strobes(study) and row is not None and row.ending == "ok",
         has_motion=row is None or row.ending != _NO_MOTION,

@@ -174,6 +174,10 @@ class Sheet:
         names = {""} if block is None else {entry.name for entry in block.entries}
         return tuple(plan for plan in self.plans if plan.name in names)
 
+    def spot_of(self, path: str) -> Spot | None:
+        """The number of a path; None where the sheet does not have it."""
+        return self.spots.get(base_pointer(path))
+
     @property
     def pictures(self) -> list[Markup]:
         """The drawings in the order of the page."""

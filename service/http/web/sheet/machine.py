@@ -26,8 +26,9 @@ from sprag_study.worker import models
 from sprag_study.worker.models.formulas import evaluate
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
+    from sprag_study.service.figures.drawing import Drawing
     from sprag_study.service.reading.reader import Reading
     from sprag_study.worker.study import Study
 
@@ -53,36 +54,48 @@ def machine_of(
     """
     best = _whole(study, best) if best else best
     shown = replace(study, base={**study.base, **best})
-    return _drawn(shown, spec, reading, variant, partial(_label, shown, reading, best=best, ends=_ends(shown)))
+    label = partial(_label, shown, reading, best=best, ends=_ends(shown))
+    every, given = drawings(shown, width=_WIDTH), _given(shown, spec)
+    links = _links(given, variant)
+    placed = {each.path for drawing in every for each in drawing.dimensions}
+    others = [
+        (reading.caption(path), label(path), links[path])
+        for path, stated in given.items()
+        if stated and path not in placed
+    ]
+    return Machine(tuple(_drawn(drawing, links, label) for drawing in every), tuple(others))
 
 
-def machine_of_case(
+def drawings_of_case(
     study: Study, spec: Mapping[str, Any], own: Mapping[str, float], reading: Reading, variant: str
-) -> Machine:
+) -> list[Markup]:
     """The machine of a case with the numbers that it has for itself (SI), without tolerances: they are drawn."""
     shown = replace(study, base={**study.base, **own})
 
     def label(path: str) -> str:
         return reading.say(joined("", [Amount(shown.base[path], unit_of(study, path), DIMENSION_DIGITS)]))
 
-    return _drawn(shown, spec, reading, variant, label)
+    links = _links(_given(shown, spec), variant)
+    return [_drawn(drawing, links, label) for drawing in drawings(shown, width=_WIDTH)]
 
 
-def _drawn(
-    study: Study, spec: Mapping[str, Any], reading: Reading, variant: str, label: Callable[[str], str]
-) -> Machine:
+def _given(study: Study, spec: Mapping[str, Any]) -> dict[str, bool]:
+    """The numbers of the machine that the form shows, and whether each varies or was given."""
     form = models.model_of(study.model).presentation.form
-    seen = {item.path: item.origin != "default" for item in inputs(study, spec)
-            if item.path in study.base and form.in_sight(item.path)}  # fmt: skip
-    links = {path: f"{variant}#{base_pointer(path)}" for path in seen}
-    found = []
-    for drawing in drawings(study, width=_WIDTH):
-        labels = {each.path: label(each.path) for each in drawing.dimensions}
-        drawn = replace(drawing, about=gettext(drawing.about))
-        found.append(Markup(svg(drawn, labels, links)))  # noqa: S704 - its texts are escaped
-        seen |= dict.fromkeys(labels, False)
-    others = [(reading.caption(path), label(path), links[path]) for path, alone in seen.items() if alone]
-    return Machine(tuple(found), tuple(others))
+    return {
+        item.path: item.origin != "default"
+        for item in inputs(study, spec)
+        if item.path in study.base and form.in_sight(item.path)
+    }
+
+
+def _links(paths: Iterable[str], variant: str) -> dict[str, str]:
+    return {path: f"{variant}#{base_pointer(path)}" for path in paths}
+
+
+def _drawn(drawing: Drawing, links: Mapping[str, str], label: Callable[[str], str]) -> Markup:
+    labels = {each.path: label(each.path) for each in drawing.dimensions}
+    return Markup(svg(replace(drawing, about=gettext(drawing.about)), labels, links))  # noqa: S704 - texts are escaped
 
 
 def _whole(study: Study, best: Mapping[str, float]) -> dict[str, float]:
