@@ -327,6 +327,7 @@ def test_doctor_finds_the_installation_sound(tmp_path: Path, sprag: Sprag) -> No
         "rights",
         "disk",
         "backups",
+        "alerts",
         "clock",
         "workers",
         "schedules",
