@@ -23,7 +23,7 @@ from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parents[1]
 #: Extras whose packages are included.
-EXTRAS = ("frames", "server", "postgres", "cluster", "traces")
+EXTRAS = ("frames", "server", "postgres", "cluster", "oidc", "traces")
 TOOLS = ("pytest", "hypothesis", "jsonschema", "openpyxl", "polars", "ruamel.yaml", "openapi-spec-validator")
 #: None of them compiles a kernel or starts a browser.
 TESTS = (

@@ -34,6 +34,9 @@ USED = {
     ("starlette", "starlette.middleware.gzip", "GZipResponder.apply_compression"): (
         "compression in few threads", "service/http/compression.py",
     ),
+    ("typer", "typer._click.shell_completion", "CompletionItem"): (
+        "what completion offers, with a help of its own", "service/cli/show.py",
+    ),
     ("uvicorn", "uvicorn.protocols.http.h11_impl", "H11Protocol"): (
         "made as uvicorn makes it, and called as any protocol of asyncio", "service/http/timeouts.py",
     ),
@@ -98,3 +101,16 @@ def test_nothing_else_that_is_private_is_used() -> None:
     for name in DOCUMENTED | own:
         used.pop(name, None)
     assert set(used) == {"_units", "_run_on_scheduler"}, used
+
+
+def test_no_other_private_module_is_imported() -> None:
+    imported: dict[str, str] = {}
+    for folder in ("engine", "worker", "service", "migrations", "sprag_study"):
+        for path in (ROOT / folder).rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+                if isinstance(node, ast.ImportFrom):
+                    names = [node.module or ""]
+                private = (name for name in names if any(part.startswith("_") for part in name.split(".")))
+                imported |= {name: f"{path.relative_to(ROOT)}:{node.lineno}" for name in private}
+    assert set(imported) == {"__future__", "typer._click.shell_completion"}, imported
