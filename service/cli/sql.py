@@ -20,6 +20,7 @@ from sprag_study.service.cli.remote import connection
 from sprag_study.service.cli.running import run_parsed
 from sprag_study.service.cli.shown import heading
 from sprag_study.service.cli.sources import SpecOrStudy, is_study, refuse_local
+from sprag_study.service.cli.stores import require_store
 
 if TYPE_CHECKING:
     from sprag_study.service.formats import Decimal
@@ -51,6 +52,7 @@ def _sql(
             refuse_local(points_file=points_file, tables=tables, db=db, processes=processes)
             parquet = _of_service(study, units)
         else:
+            require_store(db)
             parquet = _of_spec(read_study(study, points_file, files=tables), units, db, processes)
         frame: Any = selected(statement, {CASES: parquet}, polars=False)
     except StatementError as error:

@@ -41,6 +41,12 @@ def store_of(db: str | None) -> Store:
     return Store.open(database_of(db), create=False)
 
 
+def require_store(db: str | None) -> None:
+    """Refuse a database that is not there, or is empty, where a command has one (``db``); errors as of `store_of`."""
+    if db is not None:
+        store_of(db).close()
+
+
 @contextmanager
 def named_store(db: str | None) -> Iterator[Store]:
     """The store of that database, which is named before the answer unless it is in the JSON."""

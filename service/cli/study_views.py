@@ -39,7 +39,7 @@ from sprag_study.service.cli.shown import (
     show_yield,
 )
 from sprag_study.service.cli.sources import SpecOrStudy, is_study, refuse_local
-from sprag_study.service.cli.stores import store_of
+from sprag_study.service.cli.stores import require_store
 from sprag_study.service.faults import Fault
 from sprag_study.service.formats import PICTURES
 from sprag_study.service.languages import N_, _
@@ -122,8 +122,7 @@ def _function_of(command: Command) -> Callable[..., None]:
             refuse_local(measured=measured, points_file=points_file, tables=tables, db=db, processes=processes)
             opened = _remote(study, about, asked, drawing)
         else:
-            if db is not None:
-                store_of(db).close()
+            require_store(db)
             change = None if measured is None else partial(_with_measured, measured)
             parsed = read_study(study, points_file, change, tables)
             opened = _local(parsed, about, asked, settings, drawing, db, processes)

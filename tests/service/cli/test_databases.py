@@ -24,12 +24,13 @@ from tests.service.calibrating import spec_of
 from tests.service.cli.test_changing_commands import CHANGING, OTHERS
 from tests.service.timed_spec import SPEC
 
-#: Those that make a database where there is none; `preview` and `doctor` say what there would be.
+#: Those that make a database where there is none; checks and `doctor` say what there would be.
 CREATORS = {"serve", "run", "admin db upgrade"}
-SILENT = {"check", "admin doctor"}
+SILENT = {"check", "show state", "admin doctor"}
 #: Arguments of the commands of `OTHERS`.
 ARGUMENTS = {"admin db backup": "copy.sqlite3", "admin db move": "target.sqlite3", "check": "SPEC"} | {
-    **{f"show {name}": "SPEC" for name in ("front", "ribbon")},
+    **{f"show {name}": "SPEC" for name in ("front", "ribbon", "state")},
+    "show sql": "SPEC select(1)",
     "show map": "SPEC --x a --y b --z c",
     "show sensitivity": "SPEC --y c",
     "show yield": "SPEC c>0",
