@@ -191,7 +191,7 @@ def filled(**changes: str) -> dict[str, str]:
     ("name", "text", "message"),
     [
         ("/base/excitation/frequency", "25 mm", "not a unit of this field"),
-        ("/base/excitation/frequency", "", "is required"),
+        ("/base/shaft/inertia", "", "is required"),
         ("/base/pendulums/0/mass", "-1", "out of range"),
         ("/base/clutch/coefficients", "0; -200", "negative"),
         ("/base/clutch/coefficients", "", "is required"),
@@ -356,7 +356,7 @@ def test_no_torque_at_zero_windup_is_ticked_unless_said_otherwise() -> None:
 
 def test_empty_fields_and_wrong_ones_are_counted_apart() -> None:
     checked = check_form(
-        {**filled(), "/base/shaft/inertia": "", "/base/excitation/frequency": " ", "/base/gravity": "much"}, Chunking()
+        {**filled(), "/base/shaft/inertia": "", "/base/pendulums/0/inertia": " ", "/base/gravity": "much"}, Chunking()
     )
     assert (checked.missing, checked.attention) == (2, 1)
     told = str(fragment("_form_panel.html", checked=checked, address=""))
