@@ -13,6 +13,7 @@ import hashlib
 import os
 import struct
 import threading
+from collections import deque
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
@@ -44,6 +45,9 @@ class _Opened:
 #: any descriptor of a file drops all locks that SQLite has on it in this process.
 _OPENED: Final[dict[tuple[int, int], _Opened]] = {}
 _GUARD: Final = threading.Lock()
+#: Files whose sessions have ended. The garbage collector may close a session anywhere, inside of `hold` too, where it
+#: must not wait for the lock that its own thread has: whoever has the lock next gives these up.
+_ENDED: Final[deque[tuple[int, int]]] = deque()
 
 
 class HeldName:
@@ -53,13 +57,24 @@ class HeldName:
         self._file = file
 
     def release(self) -> None:
-        """Give the name up; all connections of the session are closed by then."""
-        with _GUARD:
-            opened = _OPENED[self._file]
-            opened.sessions -= 1
-            if not opened.sessions:
-                del _OPENED[self._file]
-                os.close(opened.descriptor)
+        """Give the name up; all connections of the session are closed by then. Never waits."""
+        _ENDED.append(self._file)
+        _give_up()
+
+
+def _give_up() -> None:
+    """Give the names of ended sessions up, unless somebody has the lock, who does it afterwards."""
+    while _ENDED and _GUARD.acquire(blocking=False):
+        try:
+            while _ENDED:
+                file = _ENDED.popleft()
+                opened = _OPENED[file]
+                opened.sessions -= 1
+                if not opened.sessions:
+                    del _OPENED[file]
+                    os.close(opened.descriptor)
+        finally:
+            _GUARD.release()
 
 
 def hold(path: Path) -> HeldName | None:
@@ -67,26 +82,12 @@ def hold(path: Path) -> HeldName | None:
 
     Raises DatabaseError for a file with several names, and where a process uses it under another one.
     """
-    with _GUARD:
-        try:
-            status = path.stat()
-            if status.st_nlink > 1:
-                raise linked(path, status.st_nlink)
-            file = status.st_dev, status.st_ino
-            opened = _OPENED.get(file) or _Opened(os.open(path, os.O_RDONLY | os.O_CLOEXEC))
-            place = _place_of(path)
-        except OSError:  # SQLite reports what is wrong
-            return None
-        _OPENED[file] = opened
-        opened.sessions += 1
-        held = HeldName(file)
-        _lock(opened.descriptor, place)
-        used = any(
-            _is_locked(opened.descriptor, first, length)
-            for first, length in ((0, place), (place + 1, _NAMES - place - 1))
-            if length
-        )
-    if used:
+    try:
+        with _GUARD:
+            held, used = _held(path)
+    finally:
+        _give_up()
+    if held is not None and used:
         held.release()
         raise DatabaseError(
             f"another process uses the database {path} under another name (it was moved, or its file is mounted "
@@ -94,6 +95,29 @@ def hold(path: Path) -> HeldName | None:
             "database-in-use",
         )
     return held
+
+
+def _held(path: Path) -> tuple[HeldName | None, bool]:
+    """The name, and whether another process uses the file under another one; with the lock."""
+    try:
+        status = path.stat()
+        if status.st_nlink > 1:
+            raise linked(path, status.st_nlink)
+        file = status.st_dev, status.st_ino
+        opened = _OPENED.get(file) or _Opened(os.open(path, os.O_RDONLY | os.O_CLOEXEC))
+        place = _place_of(path)
+    except OSError:  # SQLite reports what is wrong
+        return None, False
+    _OPENED[file] = opened
+    opened.sessions += 1
+    held = HeldName(file)
+    _lock(opened.descriptor, place)
+    used = any(
+        _is_locked(opened.descriptor, first, length)
+        for first, length in ((0, place), (place + 1, _NAMES - place - 1))
+        if length
+    )
+    return held, used
 
 
 def linked(path: Path, names: int) -> DatabaseError:

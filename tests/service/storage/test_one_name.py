@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from threading import Thread
 
 import pytest
 
@@ -15,6 +16,7 @@ from sprag_study.service.storage.database import one_name
 from sprag_study.service.storage.errors import DatabaseError
 from sprag_study.service.storage.readiness import Readiness
 from sprag_study.service.storage.store import Store
+from tests.acceptance.processes import SECONDS
 from tests.conftest import ROOT
 from tests.faults import refused
 from tests.worker import fakes
@@ -165,3 +167,34 @@ def test_a_process_that_begins_anew_takes_nothing_from_another(file: Path) -> No
             clock.seconds = turn
             store.work.take_over("host:1")
         assert Readiness(store).problems() == ()
+
+
+@pytest.mark.parametrize("same", [True, False])
+def test_a_session_that_ends_while_another_begins_waits_for_nothing(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, same: bool
+) -> None:
+    """As where the garbage collector closes a study within the call that opens another one."""
+    other = tmp_path / "other.sqlite3"
+    Store.open(f"sqlite:///{other}").close()
+    ended = [one_name.hold(file if same else other)]
+    place_of = one_name._place_of
+
+    def collect(path: Path) -> int:
+        while ended:
+            name = ended.pop()
+            assert name is not None
+            name.release()
+        return place_of(path)
+
+    monkeypatch.setattr(one_name, "_place_of", collect)
+    held: list[one_name.HeldName | None] = []
+    thread = Thread(target=lambda: held.append(one_name.hold(file)), daemon=True)
+    thread.start()
+    thread.join(SECONDS)
+    assert not thread.is_alive()
+    (name,) = held
+    assert name is not None
+    status = file.stat()
+    assert one_name._OPENED[status.st_dev, status.st_ino].sessions == 1
+    name.release()
+    assert (status.st_dev, status.st_ino) not in one_name._OPENED
