@@ -24,6 +24,8 @@ PAGE = (ROOT / "docs" / "tasks.md").read_text(encoding="utf-8")
 HERE, SERVICE, ADMINISTRATION = re.split(r"^## .*\n", PAGE, flags=re.MULTILINE)[1:]
 #: Lines that may end with another exit code than 0: the schedule of the page has not run yet, nor has a backup.
 CODES = {"sprag schedule night": {0, 4}, "sprag admin doctor": {0, 3}}
+#: Where the machine is slow to type the next line, its study is over.
+TOO_LATE = {"sprag study cancel latest": "A study that is finished cannot take 'cancel'"}
 
 
 def lines(part: str) -> Iterator[str]:
@@ -55,7 +57,8 @@ def typed(line: str, sprag: Callable[..., Finished], monkeypatch: pytest.MonkeyP
         subprocess.run(["sh", "-c", line], check=True, timeout=SECONDS)
         return
     done = sprag(*shlex.split(command)[1:])
-    assert done.code in CODES.get(command, {0}), (line, done.err)
+    late = command in TOO_LATE and TOO_LATE[command] in done.err
+    assert late or done.code in CODES.get(command, {0}), (line, done.err)
     if file:
         Path(file).write_text(done.out)
     if name is not None:
