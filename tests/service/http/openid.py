@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import html
 import json
+import re
 import threading
 import time
 from base64 import urlsafe_b64encode
@@ -10,12 +12,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
-from urllib.parse import parse_qs
+from urllib.parse import parse_qs, urlsplit
 
+import httpx
 from joserfc import jwt
 from joserfc.jwk import OctKey, RSAKey
 
+from sprag_study.service.http.oidc import LOGIN_COOKIE
+
 CLIENT = "sprag"
+RETURN = "/login/oidc/return"
 
 
 class Openid:
@@ -113,3 +119,45 @@ def openid() -> Iterator[Openid]:
         server.shutdown()
         server.server_close()
         thread.join()
+
+
+def begun(browser: httpx.Client, wanted: str = "/") -> dict[str, str]:
+    """What the service asks the provider for."""
+    led = browser.get("/login/oidc", params={"next": wanted})
+    assert led.status_code == 303, led.text
+    return {name: values[0] for name, values in parse_qs(urlsplit(led.headers["location"]).query).items()}
+
+
+def back(browser: httpx.Client, asked: dict[str, str], **more: str) -> httpx.Response:
+    """Come back from the provider."""
+    return browser.get(RETURN, params={"code": "c1", "state": asked["state"], **more})
+
+
+def logged_in(browser: httpx.Client, provider: Openid, wanted: str = "/", **claims: Any) -> httpx.Response:
+    """A whole login as the user of the claims."""
+    asked = begun(browser, wanted)
+    provider.claims = {"nonce": asked["nonce"], **claims}
+    return back(browser, asked)
+
+
+def login_cookie(asked: dict[str, str]) -> str:
+    """Name of the cookie of a login."""
+    return f"{LOGIN_COOKIE}{asked['state'][:12]}"
+
+
+def logins_of(browser: httpx.Client) -> list[str]:
+    """Names of the cookies of logins that a browser has."""
+    return [name for name in browser.cookies if name.startswith(LOGIN_COOKIE)]
+
+
+def no_login(answer: httpx.Response) -> str:
+    """What the login page says to a browser that comes back without a login."""
+    assert answer.status_code == 401
+    return why(answer)
+
+
+def why(answer: httpx.Response) -> str:
+    """What the login page says is wrong."""
+    found = re.search(r'<p class="fault" role="alert">(.*?)</p>', answer.text)
+    assert found, answer.text
+    return html.unescape(found[1])
