@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Final
@@ -20,7 +21,7 @@ def service_of(server: str | None, token: str | None) -> tuple[str, str | None]:
     What is given comes first, then ``SPRAG_SERVER`` and ``SPRAG_TOKEN``, then the login. A token that is kept is for
     the service of the same login only: it is sent to no other. ``SPRAG_TOKEN``, which may be the secret of a service
     of this machine, is not sent to the service of a login, however its address is given, unless ``SPRAG_SERVER``
-    names it, too.
+    names it, too; ``sprag login`` itself sends it, and keeps it.
 
     Parameters
     ----------
@@ -31,15 +32,22 @@ def service_of(server: str | None, token: str | None) -> tuple[str, str | None]:
     chosen = (named or kept.get("server") or DEFAULT_SERVER) if server is None else server
     if token is not None:
         return chosen, token
-    of_login = _place(chosen) == _place(kept.get("server", ""))
-    secret = os.environ.get("SPRAG_TOKEN") if takes_variable(chosen) else None
-    return chosen, secret or (kept.get("token", "") if of_login else None)
+    secret = os.environ.get("SPRAG_TOKEN") if _takes_variable(chosen, kept) else None
+    return chosen, secret or (kept.get("token", "") if _is_of(chosen, kept) else None)
 
 
 def takes_variable(address: str) -> bool:
     """Whether ``SPRAG_TOKEN`` is for the service at an address: not of a login, unless ``SPRAG_SERVER`` names it."""
-    place = _place(address)
-    return place != _place(profile().get("server", "")) or place == _place(os.environ.get("SPRAG_SERVER", ""))
+    return _takes_variable(address, profile())
+
+
+def _takes_variable(address: str, kept: Mapping[str, str]) -> bool:
+    return not _is_of(address, kept) or _place(address) == _place(os.environ.get("SPRAG_SERVER", ""))
+
+
+def _is_of(address: str, kept: Mapping[str, str]) -> bool:
+    """Whether an address is that of the kept login."""
+    return _place(address) == _place(kept.get("server", ""))
 
 
 def _place(address: str) -> tuple[object, ...]:

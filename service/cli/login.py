@@ -31,10 +31,13 @@ def login(
     file.unlink(missing_ok=True)
     with os.fdopen(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="utf-8") as out:
         json.dump({"server": server, **({"token": token} if token else {})}, out)
+    from sprag_study.service.client.wire import public
+
+    shown = public(server)
     if wants_json():
-        write_json({"server": server, "file": str(file), "me": me})
+        write_json({"server": shown, "file": str(file), "me": me})
     else:
-        say(_("{server} is asked from now on; {file} keeps it", server=server, file=file))
+        say(_("{server} is asked from now on; {file} keeps it", server=shown, file=file))
 
 
 def _asked() -> str:

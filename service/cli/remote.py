@@ -56,13 +56,14 @@ PriorityOption = Annotated[
 @contextmanager
 def connection() -> Iterator[Client]:
     """A client of the service of the command; its errors become failures of the command."""
-    with served_by(*address()) as client:
+    server, token = address()
+    with served_by(server, token, variable=takes_variable(server)) as client:
         yield client
 
 
 @contextmanager
-def served_by(server: str, token: str | None = None) -> Iterator[Client]:
-    """A client of a service; its errors become failures of the command."""
+def served_by(server: str, token: str | None = None, *, variable: bool = True) -> Iterator[Client]:
+    """A client of a service; its errors become failures of the command, ``variable`` as in `refusal`."""
     from sprag_study.service.client import (
         ArgumentError,
         Client,
@@ -95,20 +96,20 @@ def served_by(server: str, token: str | None = None) -> Iterator[Client]:
                 ),
             ) from error
         except RefusedError as error:
-            raise refusal(error) from error
+            raise refusal(error, variable=variable) from error
         except ArgumentError as error:
             raise WrongInputError("invalid-parameter", _("invalid argument"), error.faults) from error
         except StudyTimeoutError as error:
             raise TroubleError("not-done", _("{what}; it continues.", what=error)) from error
 
 
-def refusal(error: RefusedError) -> CommandFailureError:
-    """The failure of the command for a refusal of the service."""
+def refusal(error: RefusedError, *, variable: bool = True) -> CommandFailureError:
+    """The failure of the command for a refusal of the service; ``variable``: a token of SPRAG_TOKEN would be sent."""
     kind = cast("Kind", error.code)
     if error.status == 401:
         advice = (
             N_("{refusal} Give the service's token with --token or in SPRAG_TOKEN, or keep it with `sprag login`.")
-            if takes_variable(address()[0])
+            if variable
             else N_("{refusal} Give the service's token with --token, or log in again with `sprag login`.")
         )
         return TroubleError(kind, _(advice, refusal=earlier.said(_(error.detail))))

@@ -56,7 +56,7 @@ def settings() -> None:
 
 def _of_commands() -> Iterator[EffectiveSetting]:
     """Every other variable, by its own name."""
-    from sprag_study.service.settings import DEFAULT_ORIGIN, EffectiveSetting
+    from sprag_study.service.settings import DEFAULT_ORIGIN, EffectiveSetting, shown
 
     try:
         from sprag_study.worker import models
@@ -73,4 +73,4 @@ def _of_commands() -> Iterator[EffectiveSetting]:
     for name in VARIABLES:
         value = os.environ.get(name, "")
         other = str(profile_file()) if name == "SPRAG_SERVER" and login else DEFAULT_ORIGIN
-        yield EffectiveSetting(name, value or defaults.get(name, ""), name if value else other)
+        yield EffectiveSetting(name, shown(value or defaults.get(name, "")), name if value else other)

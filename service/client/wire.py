@@ -54,9 +54,11 @@ def connection_options(server: str, token: str | None) -> dict[str, Any]:
     try:
         url = httpx.URL(server)
     except httpx.InvalidURL as error:
-        raise ValueError(f"{public(server)!r} is not an address: {error}") from error
+        # The reason has a part of the password where a sign of it ends the host.
+        why = "/, ? and # of a password are written %2F, %3F and %23" if "@" in server else error
+        raise ValueError(f"{_without_user(server)!r} is not an address: {why}") from None
     if url.scheme not in ("http", "https") or not url.host:
-        raise ValueError(f"{public(server)!r} is not the address of a service, such as http://127.0.0.1:8000")
+        raise ValueError(f"{_without_user(server)!r} is not the address of a service, such as http://127.0.0.1:8000")
     secret = (token or "").strip()
     if secret and not _TOKEN.fullmatch(secret):  # the secret itself is in no message
         raise ValueError(N_("the token is not valid: it has only letters, digits and -._~+/ and may end with ="))
@@ -70,8 +72,13 @@ def connection_options(server: str, token: str | None) -> dict[str, Any]:
 
 
 def public(server: str) -> str:
-    """The address of a service without user and password, for messages and pickles."""
+    """The valid address of a service without user and password, for messages and pickles."""
     return re.sub(r"(?<=://)[^/?#]*@", "", server).rstrip("/")
+
+
+def _without_user(server: str) -> str:
+    """What is no address, up to its last @: a password may have any sign, and the scheme may be missing."""
+    return re.sub(r"^(.*?://)?.*@", r"\1...@", server)
 
 
 def _trusted() -> ssl.SSLContext:

@@ -8,7 +8,9 @@ import stat
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -18,8 +20,7 @@ from sprag_study.service.cli import common, components, doctor
 from sprag_study.service.cli.app import command_line
 from sprag_study.service.cli.groups import common_first
 from sprag_study.service.cli.old_words import OLD, forwarded
-from sprag_study.service.cli.remote import refusal
-from sprag_study.service.client import Client, RefusedError
+from sprag_study.service.client import Client
 from sprag_study.service.login import DEFAULT_SERVER
 from sprag_study.service.login import profile_file as login_file
 from sprag_study.service.storage.people.scopes import TokenScope
@@ -167,6 +168,13 @@ def test_a_login_keeps_address_and_token_for_its_service_only(
         monkeypatch.setenv("SPRAG_SERVER", "http://elsewhere.example")
         assert common.address() == ("http://elsewhere.example", None), "a token is sent to no other service"
         monkeypatch.delenv("SPRAG_SERVER")
+        monkeypatch.setenv("SPRAG_TOKEN", "wrong")
+        login.write_text(json.dumps({"server": address, "token": "revoked"}))
+        told = sprag("list").err
+        assert "log in again with `sprag login`" in told
+        assert "SPRAG_TOKEN" not in told, "it is not sent there"
+        assert "in SPRAG_TOKEN" in sprag("login", address).err, "which sends it"
+        monkeypatch.delenv("SPRAG_TOKEN")
         assert sprag("logout").code == 0
         assert not login.exists()
         assert sprag("list").code == 3
@@ -220,15 +228,26 @@ def test_the_secret_of_this_machine_is_not_sent_to_the_service_of_a_login(
     for kept, sent in (({}, ""), ({"token": "kept"}, "kept")):
         login.write_text(json.dumps({"server": "http://far.example", **kept}))
         assert common.address() == ("http://far.example", sent)
-    refused = RefusedError(401, {"detail": "This request carries no valid token."})
-    advice = refusal(refused).detail
-    assert "SPRAG_TOKEN" not in advice
-    assert "log in again with `sprag login`" in advice
     monkeypatch.setenv("SPRAG_SERVER", "http://near.example")
     assert common.address() == ("http://near.example", "a-secret-of-this-machine")
-    assert "SPRAG_TOKEN" in refusal(refused).detail
     with Client("http://far.example", "") as client:
         assert "authorization" not in client._http.headers
+
+
+def test_no_command_shows_the_password_of_an_address(
+    sprag: Sprag, login: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    address = "http://anna:very-secret@far.example"
+    asked = nullcontext(SimpleNamespace(me=lambda: {"user": "anna"}))
+    monkeypatch.setattr("sprag_study.service.cli.login.served_by", lambda *_: asked)
+    monkeypatch.setenv("SPRAG_TOKEN", "a-secret-of-this-machine")
+    for line in (["login", address], ["login", address, "--json"], ["settings"], ["settings", "--json"]):
+        done = sprag(*line)
+        assert (done.code, "far.example" in done.out + done.err) == (0, True), (line, done.err)
+        assert "very-secret" not in done.out + done.err, line
+    assert json.loads(login.read_text())["server"] == address
+    monkeypatch.setenv("SPRAG_SERVER", address)
+    assert "very-secret" not in sprag("settings").out
 
 
 def test_an_address_that_is_none_is_refused(sprag: Sprag, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -266,9 +266,15 @@ def test_a_password_in_the_address_is_left_behind(kind: Any) -> None:
     assert b"very-secret" not in content
     assert b"anna" not in content
     assert pickle.loads(content).server == client.server
-    with pytest.raises(ValueError, match="is not") as refused:
-        kind("ftp://anna:very-secret@sprag.example")
-    assert "very-secret" not in str(refused.value)
+    for wrong in (
+        "ftp://anna:very-secret@sprag.example",
+        "anna:very-secret@sprag.example",
+        "http://anna:very/secret@a",
+    ):
+        with pytest.raises(ValueError, match="is not") as refused:
+            kind(wrong)
+        assert "very" not in str(refused.value)
+        assert "secret" not in str(refused.value)
     sent: list[httpx.Headers] = []
     transport = httpx.MockTransport(lambda request: sent.append(request.headers) or httpx.Response(200, json={}))
     Client("http://anna:very%20secret@sprag.example", "", transport=transport).me()
