@@ -240,15 +240,18 @@ class Reading:
         return self.units.cell(value, si)
 
     def quantity(self, value: Any, si: str, digits: int = 5) -> str:
-        """A number in SI as people read it, with its unit; the unit is that of `number_and_unit`."""
+        """A number in SI as people read it, with its unit.
+
+        An angle that was given in radians stays in them where it has no short number of degrees, so that it can be
+        typed back.
+        """
         shown, unit = self._readable(value, si, digits)
         return f"{number(shown, digits)} {unit_text(unit)}".strip()
 
     def number_and_unit(self, value: float | str | None, si: str, digits: int = 8) -> tuple[str, str]:
         """As `quantity`, for columns of numbers and units, with more digits where those give the number exactly.
 
-        An angle that was given in radians stays in them where it has no short number of degrees, so that it can be
-        typed back. Texts are as they are.
+        Texts are as they are.
         """
         shown, unit = self._readable(value, si, _MOST_DIGITS)
         exact = next((more for more in range(digits, _MOST_DIGITS + 1) if _short(shown, more)), digits)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from xml.etree import ElementTree
 
 import pytest
 
-from sprag_study.service.figures.drawing import svg, with_leaders
+from sprag_study.service.figures.drawing import Drawing, svg, with_leaders
 from sprag_study.service.figures.drawings import drawings
 from sprag_study.service.http.views import preset_of
 from sprag_study.service.presets import preset_names
@@ -59,13 +60,22 @@ def test_the_train_has_a_wheel_for_each_shaft_of_its_stages() -> None:
     assert "mechanism.slider_crank.crank" in {each.path for each in mechanism.dimensions}
 
 
-@pytest.mark.parametrize("name", preset_names())
+def _presets_with(part: Callable[[Drawing], object]) -> list[str]:
+    return [name for name in preset_names() if any(map(part, drawings(_study(name))))]
+
+
+def _guides(drawing: Drawing) -> list[str]:
+    """The points of each guide."""
+    return re.findall(r'class="dashed" points="([^"]*)"', drawing.shapes)
+
+
+@pytest.mark.parametrize("name", _presets_with(lambda drawing: drawing.frames))
 def test_letters_of_a_mechanism_are_beside_its_bars(name: str) -> None:
-    for drawing in drawings(_study(name)):
-        for each in drawing.dimensions:
-            if drawing.frames:
-                assert each.apart is not None
-                assert math.hypot(*each.apart) > 10.0
+    dimensions = [each for drawing in drawings(_study(name)) if drawing.frames for each in drawing.dimensions]
+    assert dimensions
+    for each in dimensions:
+        assert each.apart is not None
+        assert math.hypot(*each.apart) > 10.0
 
 
 def test_lines_of_a_train_end_at_the_top_of_a_wheel() -> None:
@@ -76,15 +86,12 @@ def test_lines_of_a_train_end_at_the_top_of_a_wheel() -> None:
     assert {(each.x, each.y) for each in stages} <= tops
 
 
-@pytest.mark.parametrize("name", preset_names())
+@pytest.mark.parametrize("name", _presets_with(_guides))
 def test_the_line_of_an_inclination_ends_at_a_guide(name: str) -> None:
     for drawing in drawings(_study(name)):
-        for each in drawing.dimensions:
-            guides = re.findall(r'class="dashed" points="([^"]*)"', drawing.shapes)
-            if guides and each.path.endswith(".inclination") and not each.on:
-                assert f"{each.x:g},{each.y:g}" in " ".join(guides).split()
-            elif guides:
-                assert not each.path.endswith(".inclination") or ".cam." in each.path
+        if guides := " ".join(_guides(drawing)).split():
+            (inclination,) = (each for each in drawing.dimensions if each.path.endswith(".inclination"))
+            assert inclination.on or ".cam." in inclination.path or f"{inclination.x:g},{inclination.y:g}" in guides
 
 
 def test_letters_of_a_drive_lie_neither_on_its_wheel_nor_on_each_other() -> None:
