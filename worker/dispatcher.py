@@ -345,9 +345,9 @@ class Dispatcher:
 
     def _settle(self, number: int) -> None:
         """End a study without open chunks, or let it choose its next ones."""
-        self._stages.keep(self._executor.at_work())  # as soon as it has ended, others read how long it took
         study = self._studies.get(number)
         if study is not None and study.plan is not None:
+            self._stages.keep(self._executor.at_work())  # where no round is left, `advance` ends it
             try:
                 with self._stages.stage(Stage.PLANNING, {number: study.cases}):
                     appended = self._rounds.advance(self._epoch, number, study)
@@ -360,7 +360,7 @@ class Dispatcher:
                 again = dispatch.Offered(number) if polled is None else offered(polled)
                 self._handle(replace(again, chunks=appended.chunks, proven=True))
                 return
-        self._stages.keep(self._executor.at_work())
+        self._stages.keep(self._executor.at_work())  # as soon as it has ended, others read how long it took
         ended = self._store.settle(self._epoch, number)
         self._say("The study %s is %s.", number, ended.value)
         self._forget(number)

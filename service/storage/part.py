@@ -149,7 +149,9 @@ def move_row(
     Afterwards the study does not wait for anything.
     """
     before = StudyState(
-        connection.execute(sa.select(STUDIES.c.state).where(STUDIES.c.number == number).with_for_update()).scalar_one()
+        connection.execute(
+            sa.select(STUDIES.c.state).where(STUDIES.c.number == number).with_for_update(key_share=True)
+        ).scalar_one()
     )
     after = follow(before, event)
     if after is before:

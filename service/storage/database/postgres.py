@@ -1,8 +1,9 @@
 """PostgreSQL instead of SQLite: its URL, connections and transactions, its lock, and notifications of changes.
 
 Each writer holds an advisory lock for the length of its transaction. So the store has one writer at a time on a server
-too, and reasoning about SQLite's immediate transactions remains valid. What people write about a study, heartbeats and
-uses of tokens lock only the rows that they change (`Session.write_rows`): they do not wait until rows are stored.
+too, and reasoning about SQLite's immediate transactions remains valid. What people write about a study, heartbeats,
+times of stages and uses of tokens lock only the rows that they change (`Session.write_rows`): they do not wait until
+rows are stored.
 
 Rows are copied in the binary format, built as arrays instead of row by row: a row is a 16-bit number of fields, then
 for each field a 32-bit length and that many bytes, all big-endian; the length -1 and no bytes are NULL (PostgreSQL's

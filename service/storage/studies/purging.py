@@ -115,6 +115,8 @@ class Purging(Part):
     def _remove(self, number: int) -> None:
         """Delete a study that has no rows any more."""
         with self.session.write() as connection:
+            # The study first and then its rows, in the order of `TimesByStage.add`: otherwise both could deadlock.
+            connection.execute(sa.select(STUDIES.c.number).where(STUDIES.c.number == number).with_for_update())
             for table in (*OF_STUDIES, SAVED_VIEWS):
                 connection.execute(sa.delete(table).where(table.c.study == number))
             connection.execute(sa.delete(STUDIES).where(STUDIES.c.number == number))

@@ -22,9 +22,11 @@ class TimesByStage(Part):
 
     def add(self, spent: Mapping[int, Mapping[Stage, Spent]]) -> None:
         """Add to the stages of studies, by number; those of studies that are gone are left out."""
-        with self.session.write() as connection:
+        with self.session.write_rows() as connection:
             c = STUDIES.c
-            still = sa.select(c.number).where(c.number.in_(spent)).with_for_update(read=True, key_share=True)
+            # Locked so that nobody removes them before the end, and in ascending order so that writers cannot deadlock.
+            still = sa.select(c.number).where(c.number.in_(spent)).order_by(c.number)
+            still = still.with_for_update(read=True, key_share=True)
             rows = [
                 {
                     "study": number,
@@ -34,7 +36,7 @@ class TimesByStage(Part):
                     "ended_at": micros_of(time.end),
                 }
                 for number in connection.execute(still).scalars().all()
-                for stage, time in spent[number].items()
+                for stage, time in sorted(spent[number].items())
             ]
             if rows:
                 dialect = postgresql if connection.dialect.name == "postgresql" else sqlite

@@ -37,6 +37,7 @@ from sprag_study.service.storage.tables import HEAD_REVISION, STUDIES, all_table
 from sprag_study.worker import models
 from sprag_study.worker.chunking import Chunking
 from sprag_study.worker.executors.inline import InlineExecutor
+from sprag_study.worker.stages import Spent, Stage
 from sprag_study.worker.states import StudyState
 from tests import postgres
 from tests.conftest import ROOT, Finished
@@ -206,6 +207,9 @@ def test_what_people_write_and_heartbeats_do_not_wait_for_rows(
             for study_id in (record.id, waiting.id):
                 service.studies.change(study_id, StudyChange(name=f"renamed {study_id}"))
             service.work.heartbeat(second, {})
+            moment = store.clock.now()
+            spent = {Stage.COMPUTING: Spent(1.0, moment, moment)}
+            service.work.spent({record.number: spent, waiting.number: spent})
             service.people.note_uses({token.id: 1})
         with refused(DatabaseBusyError, "database-busy"):
             other.studies.pause(waiting.id)
@@ -236,6 +240,31 @@ def test_a_study_that_is_deleted_meanwhile_is_not_changed(postgres_url: str) -> 
             connection.execute(sa.update(STUDIES).where(STUDIES.c.id == record.id).values(deleted_at=1))
         changing.join()
         assert refusals
+
+
+def test_a_study_is_removed_after_its_times_were_added(postgres_url: str) -> None:
+    with Store.open(postgres_url) as store, Store.open(postgres_url) as other:
+        record = store.studies.create({}, fakes.study(3))
+        moment = store.clock.now()
+        spent = {record.number: {Stage.COMPUTING: Spent(1.0, moment, moment)}}
+        store.times.add(spent)
+        store.studies.cancel(record.id)
+        store.work.settle(store.work.take_over("test"), record.number)
+        store.studies.delete(record.id, at_once=True)
+        removing = threading.Thread(target=other.purging.purge)
+
+        class Slow(dict[int, dict[Stage, Spent]]):
+            """Times that are looked up, with their study locked, while another process removes it."""
+
+            def __getitem__(self, number: int) -> dict[Stage, Spent]:
+                removing.start()
+                time.sleep(0.5)
+                return super().__getitem__(number)
+
+        store.times.add(Slow(spent))
+        removing.join()
+        with store.session.read() as connection:
+            assert connection.execute(sa.select(sa.func.count()).select_from(STUDIES)).scalar_one() == 0
 
 
 def test_dispatchers_know_of_each_other_by_their_connections(postgres_url: str) -> None:
