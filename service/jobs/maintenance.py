@@ -187,6 +187,8 @@ class Maintenance(threading.Thread):
         due = self._plan.timing.latest_until(now)
         assert due is not None, "a time of day comes every day"
         self._look_at_disks()
+        if self._plan.folder is None:
+            self._alert(_BACKUP, None)
         try:
             believed = self._watch.believable()
         except StoreError as error:
@@ -208,21 +210,22 @@ class Maintenance(threading.Thread):
                 )
                 task.wait_until = now + AGAIN
                 if task.name == _BACKUP:
-                    self._alert("backup", backup_failed(error))
+                    self._alert(_BACKUP, backup_failed(error))
                 continue
             if task.name == _BACKUP:
-                self._alert("backup", None)
+                self._alert(_BACKUP, None)
             task.done, task.wait_until = due, None
 
     def _look_at_disks(self) -> None:
-        """Begin or end the alert of the disks of the database and of the backups."""
+        """Begin or end the alert of the disks of the database and of the backups; end it where none is watched."""
         least, session = self._plan.least_free, self._store.session
-        if not least:
-            return
         folders = [
             *([] if session.on_server else [session.path.parent]),
             *([self._plan.folder] if self._plan.folder else []),
         ]
+        if not (least and folders):
+            self._alert("disk", None)
+            return
         free = {folder: size for folder in folders if (size := _free(folder)) is not None}
         if not free:
             return

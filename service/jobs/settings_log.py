@@ -7,7 +7,7 @@ import socket
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag_study.service.actor import Actor, Door, act_as
-from sprag_study.service.settings import Settings, shown
+from sprag_study.service.settings import Settings, effective
 from sprag_study.service.storage.errors import StoreError
 from sprag_study.service.storage.people.audit import AuditFilter
 
@@ -27,7 +27,7 @@ def note_settings(store: Store, settings: Iterable[EffectiveSetting]) -> None:
     The log itself says what was set: the first start, and one after rows were deleted, has what is no default.
     """
     host = socket.gethostname()
-    before: dict[str, Any] = {name: shown(field.default) for name, field in Settings.model_fields.items()}
+    before: dict[str, Any] = {default.name: default.value for default in effective(Settings.model_construct())}
     try:
         for row in store.audit.rows(AuditFilter(action=_ACTION, target=host)):
             before |= {name: pair[1] for name, pair in row.detail["changes"].items()}

@@ -146,6 +146,20 @@ def test_a_folder_that_cannot_be_looked_at_stops_neither_backup_nor_alert(
     assert len(list(folder.glob("sprag-*.sqlite3"))) == 1
 
 
+def test_an_alert_ends_when_nothing_is_watched_any_more(
+    store: Store, disk: Callable[[float], None], tmp_path: Path
+) -> None:
+    folder = tmp_path / "b"
+    folder.write_text("a file where the folder is to be")
+    disk(0)
+    Maintenance(store, MaintenancePlan(folder, least_free=GB)).look()
+    assert {alert.kind for alert in store.alerts.present()} == {"backup", "disk"}
+    Maintenance(store, MaintenancePlan(least_free=GB)).look()
+    assert [alert.kind for alert in store.alerts.present()] == ["disk"]
+    Maintenance(store, MaintenancePlan(least_free=0)).look()
+    assert store.alerts.present() == ()
+
+
 def test_alerts_are_mails_and_webhooks_in_the_language_of_the_office(
     store: Store, disk: Callable[[float], None], tmp_path: Path
 ) -> None:

@@ -153,6 +153,12 @@ def test_every_run_of_the_last_days_is_counted(service: Service) -> None:
     assert (health.runs, health.trouble) == (nights.MOST_RUNS + 7, nights.MOST_RUNS + 7)
 
 
+def test_defaults_are_not_in_the_log_at_the_first_start(service: Service, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("SPRAG_DATABASE", raising=False)
+    note_settings(service.store, effective(Settings()))
+    assert [row.detail for row in service.store.audit.rows(AuditFilter(action="settings.change"))] == []
+
+
 def test_settings_that_changed_since_the_last_start_are_in_the_log(service: Service) -> None:
     store = service.store
 
