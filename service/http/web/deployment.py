@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 from collections import Counter
+from contextlib import suppress
 from contextvars import copy_context
 from dataclasses import dataclass
 from datetime import timedelta
@@ -60,13 +61,21 @@ def schedule_health(store: Store) -> list[Health]:
     return sorted(health, key=lambda item: not (item.late or item.trouble))
 
 
-def backups_listed(folder: str) -> list[tuple[datetime, str, int]]:
-    """When the backups were made, their names and sizes (bytes), latest first; none where the folder cannot be read."""
+def backup_files(folder: str) -> list[tuple[datetime, Path]]:
+    """When the backups were made, and their files, latest first; none where the folder cannot be read."""
     try:
-        made = backups(Path(folder).expanduser()) if folder else []
-        return [(when, path.name, path.stat().st_size) for when, path in reversed(made)]
+        return backups(Path(folder).expanduser())[::-1] if folder else []
     except OSError:
         return []
+
+
+def backups_listed(folder: str) -> list[tuple[datetime, str, int]]:
+    """When the backups were made, their names and sizes (bytes), latest first; those that go meanwhile are left out."""
+    listed = []
+    for when, path in backup_files(folder):
+        with suppress(OSError):
+            listed.append((when, path.name, path.stat().st_size))
+    return listed
 
 
 def is_being_backed_up() -> bool:

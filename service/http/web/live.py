@@ -19,9 +19,10 @@ from sprag_study.service.http.routers import page_router
 from sprag_study.service.http.schedule_views import listed as all_schedules
 from sprag_study.service.http.streams import event_stream
 from sprag_study.service.http.threads import Threads, in_thread
-from sprag_study.service.http.web.deployment import backups_listed, is_being_backed_up
+from sprag_study.service.http.web.deployment import backup_files, is_being_backed_up
 from sprag_study.service.http.web.study_list import listed
 from sprag_study.service.jobs.nights import HOURS, MOST_HOURS, night
+from sprag_study.service.jobs.reports.watchdog import late_runs
 from sprag_study.service.jobs.workers import worker_list
 from sprag_study.service.json_text import to_bytes
 from sprag_study.service.views.listed import known
@@ -51,9 +52,10 @@ def _workers(context: Context, _: QueryParams) -> Any:
     store = context.store
     dispatchers = worker_list(store.dispatchers)["dispatchers"]
     workers = [{**item, "heartbeat_at": item["heartbeat_at"][:_MINUTE]} for item in dispatchers]
-    backups = [name for _, name, _ in backups_listed(context.settings.backup_folder)]
+    backups = [path.name for _, path in backup_files(context.settings.backup_folder)]
+    late = [run.run.id for run in late_runs(store)]
     alerts = [alert.kind for alert in store.alerts.present()]
-    return [workers, all_schedules(store), backups, is_being_backed_up(), alerts]
+    return [workers, all_schedules(store), backups, is_being_backed_up(), alerts, late]
 
 
 #: What is listed, by the name of its stream.

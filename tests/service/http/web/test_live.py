@@ -14,6 +14,8 @@ from starlette.datastructures import QueryParams
 from benchmarks.faults.harness import free_port
 from sprag_study.service.http import looks as looking
 from sprag_study.service.http.web import live
+from sprag_study.service.jobs.reports.watchdog import LateRun
+from sprag_study.service.storage.schedules.runs import ExpectedRun
 from tests.acceptance.processes import SECONDS
 from tests.service.conftest import in_process
 from tests.service.timed_spec import SPEC
@@ -72,7 +74,12 @@ def test_a_heartbeat_is_no_change_of_the_workers_but_a_backup_is(
     monkeypatch.setattr(live, "worker_list", beating)
     before = live._workers(context, QueryParams())
     assert live._workers(context, QueryParams()) == before
-    monkeypatch.setattr(live, "is_being_backed_up", lambda: True)
+    with monkeypatch.context() as patch:
+        patch.setattr(live, "is_being_backed_up", lambda: True)
+        assert live._workers(context, QueryParams()) != before
+    now = service.store.clock.now()
+    late = LateRun(ExpectedRun(1, "s1", "Nightly", "UTC", now, now, None, None, taken=False), "nothing has run")
+    monkeypatch.setattr(live, "late_runs", lambda _: [late])
     assert live._workers(context, QueryParams()) != before
     page = service.http.get("/me/workers").text
     assert set(re.findall(r'id="(\w+)" data-live', page)) == {"alerts", "workers", "schedules", "backups"}
