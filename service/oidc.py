@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import ipaddress
 from typing import Annotated, Final
 from urllib.parse import urlsplit
 
 from pydantic import Field, SecretStr, ValidationInfo, field_validator
 from pydantic_settings import BaseSettings, NoDecode
 
-#: Roles as the groups of a provider give them; each allows what the ones before it allow.
-_ROLES: Final = ("viewer", "designer", "administrator")
+from sprag_study.hosts import is_loopback
+from sprag_study.service.actor import Role
+
 #: In place of a group: everybody who can log in at the provider.
 EVERYBODY: Final = "*"
 
@@ -82,8 +82,8 @@ class OidcSettings(BaseSettings):
         pairs = tuple(text.strip() for text in texts if text.strip())
         for pair in pairs:
             group, equals, role = pair.rpartition("=")
-            if not (equals and group.strip() and role.strip() in _ROLES):
-                raise ValueError(f"group=role is needed, with a role of {', '.join(_ROLES)}, such as cad=designer")
+            if not (equals and group.strip() and role.strip() in set(Role)):
+                raise ValueError(f"group=role is needed, with a role of {', '.join(Role)}, such as cad=designer")
         return pairs
 
     @field_validator("oidc_create")
@@ -93,11 +93,11 @@ class OidcSettings(BaseSettings):
             raise ValueError("SPRAG_OIDC_CREATE needs SPRAG_OIDC_ROLES, which say what new users may do")
         return value
 
-    def role_of(self, groups: tuple[str, ...]) -> str | None:
+    def role_of(self, groups: tuple[str, ...]) -> Role | None:
         """The highest role that these groups give; None where they give none."""
         pairs = [pair.rpartition("=") for pair in self.oidc_roles]
-        roles = {role.strip() for group, _, role in pairs if group.strip() in (*groups, EVERYBODY)}
-        return max(roles, key=_ROLES.index, default=None)
+        given = {role.strip() for group, _, role in pairs if group.strip() in (*groups, EVERYBODY)}
+        return next((role for role in reversed(Role) if role in given), None)
 
 
 def is_safe_address(url: str) -> bool:
@@ -110,11 +110,4 @@ def is_safe_address(url: str) -> bool:
         return False
     if not usable or "@" in place.netloc or place.fragment or not (url.isascii() and url.isprintable()):
         return False
-    return place.scheme == "https" or (place.scheme == "http" and _is_here(host))
-
-
-def _is_here(host: str) -> bool:
-    try:
-        return host == "localhost" or ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
+    return place.scheme == "https" or (place.scheme == "http" and is_loopback(host))

@@ -4,7 +4,6 @@ Every setting is an environment variable with the prefix ``SPRAG_``, and a field
 ``SPRAG_SETTINGS``; the environment takes precedence. The documentation's table is generated from `table`.
 """
 
-import ipaddress
 import os
 import re
 import tomllib
@@ -24,6 +23,7 @@ from pydantic_settings import (
     SettingsConfigDict,
 )
 
+from sprag_study.hosts import is_loopback
 from sprag_study.service.delivery import Delivery, DeliverySettings, origin_of
 from sprag_study.service.oidc import OidcSettings
 from sprag_study.service.zones import zones
@@ -295,12 +295,7 @@ class Settings(DeliverySettings, OidcSettings):
     @property
     def loopback(self) -> bool:
         """Whether only this machine can reach the service."""
-        if self.host == "localhost":
-            return True
-        try:
-            return ipaddress.ip_address(self.host.strip("[]")).is_loopback
-        except ValueError:
-            return False
+        return is_loopback(self.host)
 
     @property
     def host_names(self) -> frozenset[str]:

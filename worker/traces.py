@@ -161,12 +161,6 @@ class Begun:
         if tracer is not None:
             self._span = tracer.start_span(name, _parent(parent), attributes=attributes, start_time=began)
 
-    @property
-    def context(self) -> str:
-        """The span as a text."""
-        with self.current():
-            return context()
-
     @contextmanager
     def current(self) -> Iterator[None]:
         """Spans of this block are parts of this one."""

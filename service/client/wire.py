@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ipaddress
 import re
 import ssl
 import uuid
@@ -15,6 +14,7 @@ from urllib.parse import quote
 
 import httpx
 
+from sprag_study.hosts import is_loopback
 from sprag_study.service.client.errors import (
     ArgumentError,
     RefusedError,
@@ -241,16 +241,6 @@ def _reason(error: httpx.HTTPError) -> str:
     if isinstance(error, httpx.LocalProtocolError):  # its text has the headers, and with them the token
         return "the request has a header that HTTP does not allow"
     return str(error) or type(error).__name__
-
-
-def is_loopback(host: str) -> bool:
-    """Whether a host is this machine itself."""
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
 
 
 @contextmanager

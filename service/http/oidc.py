@@ -7,6 +7,7 @@ the protocol sends them, and any service of the database can end a login that an
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 import hmac
 import logging
@@ -19,7 +20,6 @@ from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import quote_plus, urlencode
 
 from sprag_study.sentences import Sentence
-from sprag_study.service.actor import Role
 from sprag_study.service.extras import naming_extra
 from sprag_study.service.faults import FaultError
 from sprag_study.service.http.problems import ApiError
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     import httpx
     from joserfc.jwk import Key
 
+    from sprag_study.service.actor import Role
     from sprag_study.service.settings import Settings
 
 _LOG = logging.getLogger("sprag.access")
@@ -207,8 +208,7 @@ class Provider:
             raise RefusedAccountError(why, account) from None
         groups = _claim(claims, settings.oidc_groups_claim)
         listed = [groups] if isinstance(groups, str) else groups if isinstance(groups, list) else []
-        role = settings.role_of(tuple(group for group in listed if isinstance(group, str)))
-        return account, None if role is None else Role(role)
+        return account, settings.role_of(tuple(group for group in listed if isinstance(group, str)))
 
     def _derived(self, purpose: str, login: Login) -> str:
         return self._sealed(f"login {purpose} {login.state}")
@@ -346,9 +346,10 @@ async def _json(client: httpx.AsyncClient, method: str, url: str, **sent: Any) -
     import httpx
 
     try:
-        answer = await client.request(method, url, **sent)
+        async with asyncio.timeout(_TIMEOUT):  # httpx limits each read of an answer, not all of them together
+            answer = await client.request(method, url, **sent)
         found = answer.json()
-    except (httpx.HTTPError, httpx.InvalidURL, ValueError) as error:
+    except (httpx.HTTPError, httpx.InvalidURL, TimeoutError, ValueError) as error:
         _LOG.error("The OpenID provider cannot be used at %s: %s: %s", url, type(error).__name__, error)
         raise _unusable() from error
     reason = found.get("error") if isinstance(found, dict) else None

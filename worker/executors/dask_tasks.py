@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import faulthandler
 import fcntl
-import ipaddress
 import os
 from contextlib import suppress
 from functools import partial
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import dask
 from distributed import Security
 
+from sprag_study.hosts import is_loopback
 from sprag_study.worker import fingerprint, models
 from sprag_study.worker.executors.known_answers import answers_of
 from sprag_study.worker.limits import LOAD_SECONDS
@@ -128,8 +128,7 @@ def scheduler_address(url: str) -> tuple[str, Security | None]:
     and that configuration names none.
     """
     place = url.removeprefix("dask://")
-    host = place.rpartition(":")[0].strip("[]")
-    if _is_loopback(host) and not dask.config.get("distributed.comm.require-encryption", None):
+    if is_loopback(place.rpartition(":")[0]) and not dask.config.get("distributed.comm.require-encryption", None):
         return f"tcp://{place}", None
     security = Security(require_encryption=True)
     if not all(getattr(security, name) for name in ("tls_ca_file", "tls_client_cert", "tls_client_key")):
@@ -139,13 +138,6 @@ def scheduler_address(url: str) -> tuple[str, Security | None]:
             "DASK_DISTRIBUTED__COMM__TLS__CLIENT__KEY"
         )
     return f"tls://{place}", security
-
-
-def _is_loopback(host: str) -> bool:
-    try:
-        return host == "localhost" or ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
 
 
 def blame_at_once(dask_scheduler: Any) -> None:

@@ -9,7 +9,7 @@ import threading
 import time
 from base64 import urlsafe_b64encode
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
@@ -35,6 +35,7 @@ class Openid:
     status, error : of the answer of the token endpoint
     keys : that it publishes
     asked : forms that were sent to the token endpoint
+    pause : seconds between two bytes of an answer
     """
 
     def __init__(self, port: int) -> None:
@@ -48,6 +49,7 @@ class Openid:
         self.status, self.error = 200, "invalid_grant"
         self.keys: object = [self.known.as_dict(private=False)]
         self.asked: list[dict[str, str]] = []
+        self.pause = 0.0
 
     def metadata(self) -> dict[str, Any]:
         """The metadata."""
@@ -104,7 +106,13 @@ def openid() -> Iterator[Openid]:
             self.send_header("Content-Type", "application/json")
             self.send_header("Content-Length", str(len(body)))
             self.end_headers()
-            self.wfile.write(body)
+            if not provider.pause:
+                self.wfile.write(body)
+                return
+            with suppress(OSError):  # nobody reads it any more
+                for byte in body:
+                    self.wfile.write(bytes([byte]))
+                    time.sleep(provider.pause)
 
         def log_message(self, *_: object) -> None:
             """Say nothing."""

@@ -185,6 +185,16 @@ def test_a_provider_that_is_another_or_unsafe_is_not_used(
     assert (answer.status_code, "cannot be used now" in why(answer)) == (503, True)
 
 
+def test_an_answer_that_comes_byte_by_byte_is_not_waited_for(
+    opened: Callable[..., Office], provider: Openid, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(logins, "_TIMEOUT", 0.5)
+    provider.pause = 0.02
+    answer = opened().behind_proxy(**OWN, Accept="text/html").get("/login/oidc")
+    assert (answer.status_code, "cannot be used now" in why(answer)) == (503, True)
+    assert "openid-configuration: TimeoutError" in caplog.text
+
+
 def test_userinfo_has_what_the_id_token_leaves_out(opened: Callable[..., Office], provider: Openid) -> None:
     office = opened(oidc_groups_claim="realm.roles")
     browser = office.behind_proxy(**OWN, Accept="text/html")
