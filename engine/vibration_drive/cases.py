@@ -111,16 +111,11 @@ def has_drag(paths: Iterable[str]) -> bool:
 def unloaded(matrix: Floats, pendulums: int) -> NDArray[np.bool_]:
     """Whether nothing resists the shaft of each case of a matrix, so that every speed that no clutch changes lasts."""
     resisting = [Column.LOAD, Column.BEARING, Column.LINEAR, Column.QUADRATIC]
-    free: NDArray[np.bool_] = np.all(matrix[:, resisting] == 0.0, axis=1) & ~has_backstop(matrix, pendulums)
-    return free
-
-
-def has_backstop(matrix: Floats, pendulums: int) -> NDArray[np.bool_]:
-    """Whether the drive of each case of a matrix has a backstop, as one with drag in an overrunning clutch does."""
+    # A drive with drag in an overrunning clutch has a backstop.
     width = (matrix.shape[1] - stop_column(STOPS)) // pendulums
     drags = matrix[:, stop_column(STOPS) + PendulumColumn.OVERRUNNING_DAMPING :: width]
-    backstop: NDArray[np.bool_] = np.any(drags > 0.0, axis=1)
-    return backstop
+    free: NDArray[np.bool_] = np.all(matrix[:, resisting] == 0.0, axis=1) & ~np.any(drags > 0.0, axis=1)
+    return free
 
 
 def _stop(time: Floats) -> tuple[Floats, Floats]:

@@ -99,6 +99,37 @@ def characteristics(lay: Layout, matrix: Floats, sums: Floats) -> Floats:
     return np.column_stack([out[info.name] for info in result_infos(lay.n)])
 
 
+#: Sums, marks and extrema that are 0 where the shaft stands.
+_OF_ROTATION = (
+    "time_rotating", "speed_square", "speed_cube", "work_clutch", "speed_max", "speed_min", "acc_max", "power_max",
+    "turn_0", "turn_1", "turn_2", "speed_0", "speed_2", "square_1", "cube_1",
+)  # fmt: skip
+
+
+def of_orbits(lay: Layout, matrix: Floats, sums: Floats) -> Floats:
+    """Characteristics of settled motions.
+
+    A shaft that is resisted and that no clutch drives stands on an orbit, up to rounding, even where nothing holds it:
+    without a dry load the automaton counts it as rotating.
+
+    Parameters
+    ----------
+    lay, matrix, sums :
+        As of ``characteristics``, over a whole turn of an orbit.
+
+    Returns
+    -------
+    array, shape (cases, results)
+        As of ``characteristics``.
+    """
+    cases = _Cases(lay, matrix, sums.copy())
+    stands = ~unloaded(matrix, lay.n) & (cases.shaft("time_rotating") > 0.0) & (cases.shaft("time_driven") == 0.0)
+    cases.shaft("time_held")[stands] = cases.time[stands]
+    for name in _OF_ROTATION:
+        cases.shaft(name)[stands] = 0.0
+    return characteristics(lay, matrix, cases.sums)
+
+
 def tied_clutches(lay: Layout, matrix: Floats, sums: Floats) -> NDArray[np.bool_]:
     """Clutches that stay in interaction with a held shaft, without letting go: their pendulums' angles and windups
     differ by a constant all the time.

@@ -14,7 +14,7 @@ from sprag_study.engine.run import Run, SettledRun
 from sprag_study.engine.vibration_drive import newton, orbits
 from sprag_study.engine.vibration_drive.automaton import Clutch, Shaft
 from sprag_study.engine.vibration_drive.cases import Column, with_lengths
-from sprag_study.engine.vibration_drive.characteristics import characteristics, tied_clutches
+from sprag_study.engine.vibration_drive.characteristics import of_orbits, tied_clutches
 from sprag_study.engine.vibration_drive.integration import Integration, integrate
 from sprag_study.engine.vibration_drive.kernel import Kernel
 from sprag_study.engine.vibration_drive.layout import OUT_ENDING, OUT_EVENTS, OUT_STEPS
@@ -325,7 +325,7 @@ class Search:
         self.spent[cases] += found.orders
         self.steps[cases] += sums[:, OUT_STEPS]
         self.events[cases] += sums[:, OUT_EVENTS]
-        return characteristics(self.kernel.LAYOUT, matrix, sums)
+        return of_orbits(self.kernel.LAYOUT, matrix, sums)
 
     def _failed(self, cases: Ints) -> None:
         """Let cases continue before the next search."""

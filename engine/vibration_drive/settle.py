@@ -212,12 +212,8 @@ def _write(search: Search, found: Orbits, results: _Results) -> None:
     results.put(cases, "regime.residual", found.residuals)
     results.put(cases, "regime.settled_after", _settled_after(search, found))
     results.points[cases] = found.points
-    # A shaft that is resisted and that no clutch drives stands on the orbit, up to rounding, even where nothing holds
-    # it: without a dry load the automaton counts it as rotating.
-    undriven = results.values[cases, results.column("fraction.driven")] == 0.0
-    stands = cases[undriven & ~unloaded(search.matrix[cases], search.kernel.LAYOUT.n)]
-    _put_steady_shaft(stands, 0.0, 0.0, results)
     held = results.values[cases, results.column("fraction.rotating")] == 0.0
+    results.points[cases[held], SHAFT_SPEED] = 0.0
     results.regimes[cases] = np.where(held, Regime.HELD, Regime.PERIODIC)
     _whole_run(search, cases, results)
 
@@ -306,17 +302,13 @@ def _steady_shaft(search: Search, case: int, speed: float, results: _Results) ->
     """Write the results of an unloaded shaft at a steady speed that no clutch changes."""
     at = np.array([case])
     period = search.matrix[case, Column.PERIOD]
-    _put_steady_shaft(at, speed, results.values[case, results.column("regime.order")] * period, results)
+    time = results.values[case, results.column("regime.order")] * period
+    for name, value in STEADY_SHAFT.items():
+        results.put(at, name, value(speed, time))
+    results.points[case, SHAFT_SPEED] = speed
     rest = results.values[case, results.column("shaft.speed.from_rest")]
     runup = _runup(search.turns[at], np.array([RUNUP_SHARE * rest * period]))
     results.put(at, "runup.time", period * runup if search.from_stop[case] else math.nan)
-
-
-def _put_steady_shaft(cases: Ints, speed: float, time: float, results: _Results) -> None:
-    """Write a steady speed (rad/s) of the shaft over a turn of ``time`` (s), and what follows from it."""
-    for name, value in STEADY_SHAFT.items():
-        results.put(cases, name, value(speed, time))
-    results.points[cases, SHAFT_SPEED] = speed
 
 
 def _speed_from_rest(search: Search, cases: Ints) -> Floats:

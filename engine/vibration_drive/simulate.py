@@ -13,7 +13,7 @@ from sprag_study.engine.endings import ENDINGS
 from sprag_study.engine.outcome import Batch, Trajectory
 from sprag_study.engine.run import Run, SettledRun
 from sprag_study.engine.vibration_drive.automaton import Clutch, Shaft
-from sprag_study.engine.vibration_drive.cases import case_matrix, pendulum_count, scalars
+from sprag_study.engine.vibration_drive.cases import case_matrix, pendulum_count, scalars, unloaded
 from sprag_study.engine.vibration_drive.characteristics import characteristics
 from sprag_study.engine.vibration_drive.integration import Integration, integrate
 from sprag_study.engine.vibration_drive.kernel import kernel_of, order_for
@@ -117,17 +117,20 @@ def trajectory(columns: Mapping[str, ArrayLike], run: Run, times: ArrayLike, sta
         raise ValueError(f"times must ascend within 0 .. {end:g} s")
     periods = np.minimum(asked * frequency, run.duration.in_periods(frequency))
     module = kernel_of(values, run.tolerance)
-    found = integrate(module, case_matrix(values, run, 1), run, starts=start, times=periods)
-    return sampled(values, found, asked)
+    matrix = case_matrix(values, run, 1)
+    found = integrate(module, matrix, run, starts=start, times=periods)
+    return sampled(values, matrix, found, asked)
 
 
-def sampled(values: Mapping[str, float], found: Integration, times: Floats) -> Trajectory:
+def sampled(values: Mapping[str, float], matrix: Floats, found: Integration, times: Floats) -> Trajectory:
     """The instantaneous values that a call of the kernel has left of one case, by name.
 
     Parameters
     ----------
     values : mapping
         The case, as for ``trajectory``.
+    matrix : array, shape (1, columns)
+        The case, as the kernel read it.
     found : Integration
         Of a call that was asked for samples.
     times : array, shape (m,)
@@ -148,8 +151,8 @@ def sampled(values: Mapping[str, float], found: Integration, times: Floats) -> T
     for column, name in zip(ShaftSample, ("shaft.angle", "shaft.speed", "shaft.acceleration", "torque"), strict=True):
         out[name] = samples[:, column]
     overrunning = [values.get(f"pendulums.{i}.overrunning_damping", 0.0) for i in range(n)]
-    if value["shaft.load"] > 0.0 or max(overrunning) > 0.0:
-        # As for the minimum in ``characteristics``: only rounding errors can turn back a loaded shaft.
+    if not unloaded(matrix, n)[0]:
+        # As for the minimum in ``characteristics``: only rounding errors can turn back a resisted shaft.
         out["shaft.speed"] = np.maximum(out["shaft.speed"], 0.0)
     out["power.useful"] = _load_torque(value, out["shaft.speed"]) * out["shaft.speed"]
     out["power.clutch"] = out["torque"] * out["shaft.speed"]

@@ -30,7 +30,7 @@ Flags = NDArray[np.bool_]
 OFF = 0.01
 #: Most excitation periods by which a run is continued: a factor on its own, and an absolute maximum.
 TIMES, MOST = 6, 340
-#: Amplitude in rad below which a pendulum does not swing.
+#: Amplitude in rad below which a pendulum does not swing, and turn in an excitation period below which a shaft stands.
 _STILL = 1e-6
 #: The first of them, before the rounds of `ROUND`.
 _FIRST = 20
@@ -122,7 +122,11 @@ class _Settled:
         scale = np.abs(self.seen)
         scale[:, 1:] = np.maximum(scale[:, 1:], _STILL)
         off = np.abs(own - self.seen) > OFF * scale
-        held = (own[:, 0] == 0.0) & (self.seen[:, 0] == 0.0)
+        matrix = self._search.matrix
+        # A shaft that only torques resist that depend on its speed stands in the limit.
+        slows = (matrix[:, Column.LOAD] == 0.0) & ~unloaded(matrix, self._search.kernel.LAYOUT.n)
+        turn = np.maximum(own[:, 0], self.seen[:, 0]) * matrix[:, Column.PERIOD]
+        held = turn <= np.where(slows, _STILL, 0.0)
         return np.where(held, np.any(off[:, 1:], axis=1), off[:, 0])
 
     def lost(self, cases: Ints) -> None:

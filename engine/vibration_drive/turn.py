@@ -102,4 +102,4 @@ def turn(values: Mapping[str, float], run: Run, points: Floats, periods: int, ea
     )
     times = np.arange(periods * each + 1) / each
     found = integrate(kernel_of(values, run.tolerance), matrix, run, starts=points, times=first + times)
-    return sampled(values, found, times / values["excitation.frequency"])
+    return sampled(values, matrix, found, times / values["excitation.frequency"])

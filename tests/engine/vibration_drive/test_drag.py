@@ -12,10 +12,11 @@ from sprag_study.engine.endings import Ending
 from sprag_study.engine.run import Reset, Run, SettledRun, Span
 from sprag_study.engine.vibration_drive.parameters import DRAG
 from sprag_study.engine.vibration_drive.regimes import Regime, settled_infos
-from sprag_study.engine.vibration_drive.results import STEADY_SHAFT
+from sprag_study.engine.vibration_drive.results import STEADY_SHAFT, result_infos
 from sprag_study.engine.vibration_drive.settle import settle
 from sprag_study.engine.vibration_drive.simulate import trajectory
 from sprag_study.engine.vibration_drive.strobes import SHAFT_SPEED
+from sprag_study.engine.vibration_drive.transients import simulate_judged
 from tests.engine.odd_drives import odd_drive
 from tests.engine.vibration_drive.drive import Columns, Results, batch_of, clutch, column, drive, one, pendulum, periods
 from tests.engine.vibration_drive.test_against_scipy import compare
@@ -229,10 +230,25 @@ def test_a_shaft_that_only_drag_resists_is_held_in_the_limit(speed: float) -> No
     settled = settle(batch_of(cases), SettledRun(), cases=len(cases))
     assert settled.regimes.tolist() == [Regime.HELD] * len(cases)
     names = [info.name for info in settled_infos(1)]
-    shaft = {name: settled.values[:, names.index(name)] for name in STEADY_SHAFT}
-    for name, expected in STEADY_SHAFT.items():
-        np.testing.assert_array_equal(shaft[name], expected(0.0, 1.0), err_msg=name)
+    standing = {name: value(0.0, 1.0) for name, value in STEADY_SHAFT.items()}
+    standing |= dict.fromkeys((
+        "shaft.acceleration.max", "power.useful.mean", "power.useful.max", "power.clutch.mean", "power.clutch.max",
+        "power.bearing.mean", "power.linear.mean", "power.quadratic.mean", "efficiency", "balance.momentum",
+    ), 0.0)  # fmt: skip
+    for name, expected in standing.items():
+        np.testing.assert_array_equal(settled.values[:, names.index(name)], expected, err_msg=name)
     assert not settled.points[:, SHAFT_SPEED].any()
+
+
+def test_a_window_in_which_drag_has_stopped_the_shaft_is_settled() -> None:
+    """The window has what is left of the speed, the orbit a shaft that stands."""
+    still = {"shaft.load": 0.0, "shaft.initial_speed": 30.0, "pendulums.0.backlash": 1.0}
+    cases = [drive(1, **still, shaft__bearing_damping=damping) for damping in np.geomspace(0.01, 0.1, 6)]
+    cases.append(drive(1, **still, shaft__bearing_damping=1e-3))
+    judged = simulate_judged(batch_of(cases), periods(200.0, 160.0, 200.0), cases=len(cases))
+    speed = judged.batch.values[:, [info.name for info in result_infos(1)].index("shaft.speed.mean")]
+    assert (speed[:-1] > 0.0).all()
+    assert judged.off.tolist() == [False] * 6 + [True]
 
 
 def test_a_resisted_shaft_does_not_turn_back() -> None:
@@ -242,6 +258,8 @@ def test_a_resisted_shaft_does_not_turn_back() -> None:
     )
     row = one(columns, periods(4.0, 1.0, 4.0))
     assert row["shaft.speed.min"] == row["shaft.speed.mean"] == row["shaft.speed.max"] == 0.0
+    path = trajectory(columns, periods(4.0, 1.0, 4.0), [0.0, 1e-3])
+    assert column(path, "shaft.speed").tolist() == [0.0, 0.0]
 
 
 # Clutches with damping and drag, between a pendulum and a shaft that nothing else moves.
