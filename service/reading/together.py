@@ -41,7 +41,7 @@ def with_last_unit(texts: Sequence[str]) -> list[str]:
     Where other units stand before it, or the unit is not at the end, they stay as they are: the reader of the spec
     asks.
     """
-    units = [_typed_unit(text) for text in texts]
+    units = [typed_unit(text) for text in texts]
     last = next((unit for text, unit in zip(reversed(texts), reversed(units), strict=True) if text.strip()), None)
     if not last or _kind(last) is None or len({_kind(unit) for unit in set(units) if unit}) > 1:
         return list(texts)
@@ -55,7 +55,7 @@ def split_list(text: str) -> list[str]:
 
 def with_unit_of_range(first: str, last: str, step: str) -> tuple[str, str, str]:
     """The ends and the step of a range with the unit of its end, or of the step where only that has one."""
-    if _typed_unit(step) == "":
+    if typed_unit(step) == "":
         first, step, last = with_last_unit([first, step, last])
     else:
         first, last, step = with_last_unit([first, last, step])
@@ -83,7 +83,7 @@ def questions(values: Sequence[object], units: Sequence[str]) -> list[Question]:
     """As `question`, about every such number of values that have SI units of their own: coefficients of a series."""
     if not any(isinstance(value, str) for value in values):
         return []
-    typed = [_typed_unit(value) if isinstance(value, str) else None for value in values]
+    typed = [typed_unit(value) if isinstance(value, str) else None for value in values]
     # Each once, however many values there are: whether a name is a unit takes long where it is none.
     pairs = dict.fromkeys((name, unit) for name, unit in zip(typed, units, strict=True) if name)
     others = [pair for pair in pairs if _differs(*pair)]
@@ -119,7 +119,7 @@ def _bare(value: object, unit: str | None) -> str | None:
     return repr(value) if isinstance(value, int | float) and not isinstance(value, bool) and value else None
 
 
-def _typed_unit(text: object) -> str | None:
+def typed_unit(text: object) -> str | None:
     """The unit of a text as it was typed, "" of a bare number; None for what is no quantity."""
     try:
         return split_typed(str(text))[1]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from sprag_study.sentences import Amount, Name, Sentence, joined
 from sprag_study.service.faults import Fault, ParameterFault, SelectionError, parameter_error, refused, shown
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.catalogue import result_of, unit_of, unknown_result
+from sprag_study.service.reading.deviations import deviations
 from sprag_study.service.reading.numbers import in_language
 from sprag_study.service.reading.reader import Phrase, term
 from sprag_study.service.reading.texts import did_you_mean
@@ -133,7 +134,14 @@ def with_tolerance(study: Study, path: str, value: str | Amount) -> str | Amount
     one = tolerance_of(study, path)
     if one is None or "plus_minus" not in one.about:
         return value
-    return Phrase("{value} ± {tolerance}", value=value, tolerance=typed_text(str(one.about["plus_minus"])))
+    return joined(" ", (value, deviation_text(one.about)))
+
+
+def deviation_text(about: Mapping[str, Any]) -> str | Phrase:
+    """The deviations of a tolerance as they were written: ``± 60 %``, or ``+0.05/-0 mm``."""
+    text = str(about["plus_minus"])
+    typed = typed_text(text)
+    return typed if deviations(text) else Phrase("± {tolerance}", tolerance=typed)
 
 
 def held_texts(study: Study, at: Mapping[str, float]) -> tuple[Phrase, ...]:

@@ -11,10 +11,10 @@ from sprag_study.sentences import Amount
 from sprag_study.service.languages import _
 from sprag_study.service.reading.catalogue import axes_json, shown_values, unit_of
 from sprag_study.service.reading.reader import CODES, Phrase, joined, plural, term
-from sprag_study.service.reading.wording import number, typed_text, unit_text
+from sprag_study.service.reading.wording import number, unit_text
 from sprag_study.service.results.calibration import plan_of
 from sprag_study.service.results.fronts import goal_of
-from sprag_study.service.results.selection import tolerance_of, with_tolerance
+from sprag_study.service.results.selection import deviation_text, tolerance_of, with_tolerance
 from sprag_study.worker.models import NO_PARAMETERS
 from sprag_study.worker.planning.calibrate.plan import CALIBRATE
 from sprag_study.worker.planning.goals.plan import GOAL
@@ -117,8 +117,7 @@ def with_distribution(study: Study, path: str, value: Text) -> Text:
 def tolerances_of(study: Study) -> Iterator[tuple[tuple[str, ...], Phrase]]:
     """The parameters of each tolerance, and how they differ from drive to drive: ``± 60 %, normal``."""
     for one in study.tolerances:
-        width = one.about.get("plus_minus")
-        parts = [] if width is None else [Phrase("± {tolerance}", tolerance=typed_text(str(width)))]
+        parts = [deviation_text(one.about)] if "plus_minus" in one.about else []
         yield one.paths, joined(", ", (*parts, *_distribution(one.about)))
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 from sprag_study.service.reading.catalogue import range_sentence
 from sprag_study.service.spec.axes.axes import PATHS, read_paths
 from sprag_study.service.spec.described import Record
-from sprag_study.service.spec.draws.described import DISTRIBUTION, FIELDS, read_measured, read_plus_minus
+from sprag_study.service.spec.draws.described import DISTRIBUTION, FIELDS, both_of, read_measured, read_plus_minus
 from sprag_study.service.spec.draws.distributions import Distribution
 from sprag_study.service.spec.lists import refuse_mixed
 from sprag_study.service.spec.schema.quantity import QUANTITY
@@ -65,15 +65,15 @@ def read_distribution(item: Node) -> SampleDistribution | None:
         item.refuse_each(("nominal", "plus_minus", "distribution"), "cannot be combined with `values`")
         values = read_measured(item["values"], parameters)
         return None if values is None else SampleDistribution(paths, Distribution("values", values=tuple(values)))
-    if refuse_mixed([item["nominal"], item["plus_minus"]], unit):
+    if refuse_mixed([item["nominal"], *both_of(item["plus_minus"])], unit):
         return None
     kind = DISTRIBUTION.read(item)
     nominal = _read_nominal(item["nominal"], parameters)
-    read = read_plus_minus(item["plus_minus"], parameters[0])
+    read = None if kind is None else read_plus_minus(item, parameters[0], kind)
     if kind is None or nominal is None or read is None:
         return None
-    share, half = read
-    half = half * abs(nominal) if share else half
+    scale = nominal if read.share else 1.0
+    middle, half = read.middle * scale, read.half * abs(scale)
     if half == 0.0:
         item["plus_minus"].refuse("out-of-range", "needs a nominal value other than 0", allowed="a quantity", unit=unit)
         return None
@@ -84,7 +84,7 @@ def read_distribution(item: Node) -> SampleDistribution | None:
         return None
     low = max(math.nextafter(one.low, math.inf) if one.low_open else one.low for one in parameters)
     high = min(one.high for one in parameters)
-    return SampleDistribution(paths, Distribution(kind, nominal, half, low=low, high=high))
+    return SampleDistribution(paths, Distribution(kind, nominal + middle, half, low=low, high=high))
 
 
 def _read_nominal(node: Node, parameters: list[Parameter]) -> float | None:

@@ -268,15 +268,13 @@ def _mixed(node: Node, nominal: list[_Nominal]) -> bool:
 def _around(item: Node, kind: str, name: str, paths: tuple[str, ...], nominal: list[_Nominal]) -> list[_Drawn]:
     """A tolerance around the nominal values."""
     node = item["plus_minus"]
-    if isinstance(node.value, str) and node.value.strip().startswith("±"):  # as pages print it
-        node = node.holding(node.value.strip()[1:].lstrip())
     if _mixed(node, nominal):
         return []
     units = list(dict.fromkeys(one.parameter.unit for one in nominal))
-    read = read_plus_minus(node, nominal[0].parameter)
+    read = read_plus_minus(item, nominal[0].parameter, kind)
     if read is None:
         return []
-    share, half = read
+    share, middle, half = read.share, read.middle, read.half
     if not share and len(units) > 1:
         message = Sentence("is shared by parameters of different units: {units}", units=unit_list(units))
         node.refuse("wrong-unit", message, allowed='a share, as in "5 %"')
@@ -299,8 +297,8 @@ def _around(item: Node, kind: str, name: str, paths: tuple[str, ...], nominal: l
         node.refuse("out-of-range", message, allowed="a quantity", unit=units[0])
         return []
     low, high = _range(nominal, share=share)
-    distribution = Distribution(kind, 1.0 if share else 0.0, half, low=low, high=high)  # type: ignore[arg-type]
-    about = {"distribution": kind, "plus_minus": node.value}
+    distribution = Distribution(kind, middle + (1.0 if share else 0.0), half, low=low, high=high)  # type: ignore[arg-type]
+    about = {"distribution": kind, "plus_minus": read.written}
     return [_Drawn(item, Tolerance(name, paths, "scale" if share else "offset", about), distribution)]
 
 

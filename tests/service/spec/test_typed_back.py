@@ -11,6 +11,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -33,6 +34,7 @@ from sprag_study.service.reading.quantities import KINDS, Units
 from sprag_study.service.reading.reader import Reading
 from sprag_study.service.reading.units import QuantityError, measure, parse_quantity, split_quantity
 from sprag_study.service.reading.wording import number, typed_text, unit_text
+from sprag_study.service.results.selection import with_tolerance
 from sprag_study.service.spec.components import KINDS as COMPONENT_KINDS
 from sprag_study.service.spec.components import faults_of, fields_of
 from sprag_study.service.spec.document import format_of, load_spec, parse_spec
@@ -281,14 +283,40 @@ def test_no_limit_of_the_windup_is_typed_as_it_is_printed(code: str) -> None:
         assert "clutch.windup_limit" not in parse_spec(spec).study.base
 
 
-@pytest.mark.parametrize("text", ["9 N/mm ± 10 %", "9 ± 10 %", "9 ± 0.9 N/mm", "9 ± 0.9"])
-def test_a_value_is_typed_with_its_tolerance(text: str) -> None:
+@pytest.mark.parametrize(
+    ("text", "written"),
+    [
+        ("9 N/mm ± 10 %", "10 %"),
+        ("9 ± 10 %", "10 %"),
+        ("9 ± 0.9 N/mm", "0.9 N/mm"),
+        ("9 ± 0.9", "0.9 N/mm"),  # the unit beside the field
+        ("9 N/mm +0.9/-0", "+0.9/-0 N/mm"),
+        ("9 +0.9/-0.1", "+0.9/-0.1 N/mm"),
+        ("9 +5/-2 %", "+5/-2 %"),
+        ("9 0/-0.1 N/mm", "0/-0.1 N/mm"),
+    ],
+)
+def test_a_value_is_typed_with_its_tolerance(text: str, written: str) -> None:
     values = values_of(preset_of("one_pendulum")["spec"])
     values |= {"/base/pendulums/0/spring_rate": text, "unit:/base/pendulums/0/spring_rate": "N/mm"}
     settle(values)
     study = parse_spec(spec_of(values)[0]).study
     assert study.base["pendulums.0.spring_rate"] == 9000.0
     assert study.spread is not None
-    assert [one.about["plus_minus"] for one in study.spread.tolerances] == [
-        {"0.9": "0.9 N/mm"}.get(tolerance := text.partition("± ")[2], tolerance)  # the unit beside the field
-    ]
+    assert [one.about["plus_minus"] for one in study.spread.tolerances] == [written]
+
+
+@pytest.mark.parametrize("code", LANGUAGES)
+@pytest.mark.parametrize("written", ["10 %", "+0.9/-0.1 N/mm", "0/-5 %"])
+def test_a_tolerance_is_typed_as_it_is_printed(written: str, code: str) -> None:
+    path = "pendulums.0.spring_rate"
+    study = parse_spec(changed({"/tolerances": [{"path": path, "plus_minus": written}]})).study
+    with language(code):
+        printed = str(with_tolerance(study, path, languages.decimal("9 N/mm")))
+        values = values_of(preset_of("one_pendulum")["spec"]) | {"/base/pendulums/0/spring_rate": printed}
+        settle(values)
+        again = parse_spec(spec_of(values)[0]).study
+    assert again.base[path] == 9000.0
+    drives = np.arange(257.0)
+    drawn = [one.spread.values(path, 9000.0, drives).tolist() for one in (again, study) if one.spread is not None]
+    assert drawn[0] == drawn[1]

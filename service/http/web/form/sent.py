@@ -15,6 +15,7 @@ from sprag_study.service.http.web.form.parts import count_of, drop, reshape, wit
 from sprag_study.service.http.web.form.spec import PARTS, is_search
 from sprag_study.service.http.web.form.tolerances import BATCH, own_name
 from sprag_study.service.languages import _
+from sprag_study.service.reading.deviations import with_tolerance
 from sprag_study.service.reading.numbers import parse_number
 from sprag_study.service.reading.quantities import is_si
 from sprag_study.service.reading.together import split_list, with_last_unit
@@ -37,7 +38,7 @@ WAS: Final = "was:"
 KIND: Final = "kind:"
 #: Numbers of a row that have the row's unit.
 IN_ROW: Final = ("from", "to", "step", "values", "value")
-_BARE: Final = re.compile(r"[-+\d.,;\seE\u00a0\u202f\u2212'’]*\d[-+\d.,;\seE\u00a0\u202f\u2212'’]*")
+_BARE: Final = re.compile(r"[-+/\d.,;\seE\u00a0\u202f\u2212'’]*\d[-+/\d.,;\seE\u00a0\u202f\u2212'’]*")
 #: Values between the ends that are proposed for a number.
 _VALUES: Final = "9"
 
@@ -86,12 +87,13 @@ def with_first_values(values: Mapping[str, str]) -> Values:
 
 
 def _part_tolerances(values: Values) -> None:
-    """Read a number with its tolerance, such as ``9 N/mm ± 10 %``, into the fields of both."""
-    typed = [name for name, text in values.items() if "±" in text and name.startswith(f"{BASE}/")]
+    """Read a number with its tolerance, ``9 N/mm ± 10 %`` or ``30 +0.05/-0 mm``, into the fields of both."""
+    typed = {name: with_tolerance(text) for name, text in values.items() if name.startswith(f"{BASE}/")}
+    typed = {name: parts for name, parts in typed.items() if parts is not None}
     for name in typed and [entry.name for entry in entries(values) if entry.tolerant and entry.name in typed]:
-        parts, field = with_last_unit(values[name].split("±", 1)), f"{own_name(name)}/plus_minus"
-        if all(part.strip() for part in parts) and not values.get(field, "").strip():
-            values |= {name: parts[0].strip(), field: parts[1].strip(), BATCH: "on"}
+        parts, field = typed[name], f"{own_name(name)}/plus_minus"
+        if parts is not None and not values.get(field, "").strip():
+            values |= {name: parts[0], field: parts[1], BATCH: "on"}
             if UNIT + name in values:  # the unit beside the field is that of both numbers
                 values[UNIT + field] = values[UNIT + name]
 

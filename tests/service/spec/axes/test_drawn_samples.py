@@ -40,6 +40,18 @@ def test_values_have_their_distribution(method: str) -> None:
     assert set(found["shaft.inertia"]) == {1e-3, 2e-3}
 
 
+def test_two_deviations_are_on_either_side_of_the_nominal_value() -> None:
+    angle = "pendulums.0.initial_angle"
+    parts = (
+        {"path": LOAD, "nominal": "0.2 N*m", "plus_minus": "+50 N*mm/-0", "distribution": "uniform"},
+        # Shares are of the size of a value: 10 % more of a negative one is further below 0.
+        {"path": angle, "nominal": -1, "plus_minus": "+10/-0 %", "distribution": "uniform"},
+    )
+    found = columns_of(sample(*parts))
+    assert stats.kstest(found[LOAD], stats.uniform(0.2, 0.05).cdf).pvalue > 0.01
+    assert stats.kstest(found[angle], stats.uniform(-1.1, 0.1).cdf).pvalue > 0.01
+
+
 def test_the_parts_of_a_sample_may_be_correlated() -> None:
     parts = ({"path": MASS, "plus_minus": "30 %"}, {"path": LOAD, "nominal": 0.2, "plus_minus": "10 %"})
     found = columns_of(sample(*parts, correlations=[{"between": [MASS, LOAD], "coefficient": 0.7}]))
@@ -58,6 +70,7 @@ def test_a_sample_over_ranges_is_drawn_as_before() -> None:
         (sample({"path": MASS, "distribution": "normal"}), "ranges/0/plus_minus", "required"),
         (sample({"path": MASS, "plus_minus": "5 %", "from": 1}), "ranges/0/from", "unknown-field"),
         (sample({"path": "pendulums.0.initial_angle", "plus_minus": "5 %"}), "ranges/0/plus_minus", "out-of-range"),
+        (sample({"path": MASS, "nominal": 2, "plus_minus": "+20/-5 g"}), "ranges/0/nominal", "ambiguous-unit"),
         (sample({"path": MASS, "values": [1], "plus_minus": "5 %"}), "ranges/0/plus_minus", "conflict"),
         (sample({"path": MASS, "nominal": -1, "plus_minus": "5 %"}), "ranges/0/nominal", "out-of-range"),
         (

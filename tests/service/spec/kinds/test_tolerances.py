@@ -56,6 +56,23 @@ def test_each_place_of_a_grid_is_run_with_the_nominal_drive_and_every_drawn_one(
     assert parsed({"/axes": LOADS}).study == without_drives(study)
 
 
+@pytest.mark.parametrize(
+    ("text", "low", "high"),
+    [("+5/-2 %", 0.098, 0.105), ("+5 N*mm/-0", 0.1, 0.105), ("0/-20 N*mm", 0.08, 0.1), ("+0,04/+0,01 N*m", 0.11, 0.14)],
+)
+def test_two_deviations_are_the_limits_as_on_a_drawing(text: str, low: float, high: float) -> None:
+    item = {"path": "shaft.load", "plus_minus": text}
+    spec = changed(with_tolerances({**item, "distribution": "uniform"}, axes=[]))
+    schema().validate(spec)
+    nominal, *drawn = parse_spec(spec).study.columns(range(65))["shaft.load"].tolist()
+    assert nominal == 0.1
+    assert low <= min(drawn) < low + 0.03 * (high - low)
+    assert high >= max(drawn) > high - 0.03 * (high - low)
+    normal = study_of(item, axes=[]).columns(range(1, 65))["shaft.load"]
+    assert normal.mean() == pytest.approx((low + high) / 2.0, rel=2e-3)
+    assert normal.std() == pytest.approx((high - low) / 6.0, rel=0.05)
+
+
 def test_a_study_without_axes_has_one_place() -> None:
     study = study_of({"path": "shaft.load", "plus_minus": "5 %"}, axes=[])
     assert study.shape == (65,)
@@ -234,6 +251,12 @@ REFUSED: list[tuple[dict[str, Any], str, str]] = [
     ({"path": BACKLASH, "plus_minus": 1e308}, "plus_minus", "out-of-range"),
     ({"path": BACKLASH, "plus_minus": "1 mm"}, "plus_minus", "wrong-unit"),
     ({"path": BACKLASH}, "plus_minus", "required"),
+    ({"path": LOAD, "plus_minus": "+5 %/+5 %"}, "plus_minus", "out-of-range"),
+    ({"path": LOAD, "plus_minus": "+5 %/-5000 %"}, "plus_minus", "out-of-range"),
+    ({"path": LOAD, "plus_minus": "+5 %/-1 N*mm"}, "plus_minus", "wrong-unit"),
+    ({"path": LOAD, "plus_minus": "+1 N*mm/-1 mm"}, "plus_minus", "wrong-unit"),
+    ({"path": LOAD, "plus_minus": "+0.01/-0.02"}, "plus_minus", "missing-unit"),
+    ({"path": LOAD, "plus_minus": "+5 %/-2 %", "distribution": "lognormal"}, "distribution", "conflict"),
     ({"path": "pendulums.1.backlash", **FIVE}, "path", "invalid-path"),
     ({"path": DRIVE, **FIVE}, "path", "invalid-path"),
     ({**FIVE}, "path", "required"),
