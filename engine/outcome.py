@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag_study.engine.catalogue import ResultInfo
 from sprag_study.engine.endings import Ending
 
 
@@ -180,4 +181,32 @@ class Engagements:
     regime: str
     rows: tuple[Engagement, ...]
     periods: tuple[PeriodMeans, ...]
+    ending: Ending
+
+
+@dataclass(frozen=True, slots=True)
+class Forces:
+    """The forces of one case.
+
+    Attributes
+    ----------
+    start, end : float
+        The examined part of the run, in s.
+    regime : str
+        Name of the settled motion's regime; "" for a run of a given time.
+    infos : tuple of ResultInfo
+        Its results; none where the ending is not ok.
+    results : dict
+        The results by name, SI; NaN where a value does not exist.
+    motion : Trajectory
+        The forces over time.
+    ending : Ending
+    """
+
+    start: float
+    end: float
+    regime: str
+    infos: tuple[ResultInfo, ...]
+    results: dict[str, float]
+    motion: Trajectory
     ending: Ending

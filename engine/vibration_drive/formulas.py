@@ -7,9 +7,12 @@ arrays.
 from collections.abc import Sequence
 from typing import TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from sprag_study.engine.taylor.straight import Term
 
-_Value = TypeVar("_Value", float, Term)
+_Value = TypeVar("_Value", float, Term, NDArray[np.float64])
 _Pair = tuple[_Value, _Value]
 
 
