@@ -16,6 +16,7 @@ from sprag_study.service.spec.axes.design import ANYTHING
 from sprag_study.service.spec.derive import read_machine
 from sprag_study.service.spec.described import Listed, Record
 from sprag_study.service.spec.document import ParsedSpec, parse_spec
+from sprag_study.service.spec.fields import renamed
 from sprag_study.service.spec.kinds.registry import without_cases
 from sprag_study.service.spec.kinds.sweep import sweep_of
 from sprag_study.service.spec.kinds.tolerances import SPREAD
@@ -33,11 +34,13 @@ _AXES: Final = (
     "further values of axes of a grid; a parameter that did not vary becomes an axis of the base's value and these"
 )
 _CASES: Final = "further cases, which come after those of the study; what they do not vary is as in the base"
+#: What stands behind the name of an extended study.
+_SUFFIX: Final = ", extended"
 EXTENSION: Final = Record(
     {
         "axes": Listed("axes", 1, MAX_AXES, _AXES, item=AXIS),
         "cases": Listed("cases", 1, MAX_AXES, _CASES, item=ANYTHING),
-        "name": {"type": "string", "description": "name of the new study; by default that of the old one"},
+        "name": {"type": "string", "description": "name of the new study; by default that of the old one, extended"},
     },
     "what is added to a study: either axes or cases",
 )
@@ -89,7 +92,7 @@ def extended_spec(
     items, field = _read_addition(root, study)
     # The tolerances stay: every further place is run with the same drives.
     kept = without_cases(spec, SPREAD)
-    kept["name"] = root["name"].otherwise(study.name).value
+    kept["name"] = root["name"].otherwise(renamed(study.name, _SUFFIX)).value
     places = without_drives(study)
     own: list[dict[str, Any]] = [
         {

@@ -64,6 +64,12 @@ def test_a_machine_shaft_is_extended_by_any_of_its_numbers() -> None:
     assert new.axes[-1].values == (20.0, 30.0)
 
 
+def test_an_extended_study_has_a_name_of_its_own() -> None:
+    for addition in ({"axes": [{"path": "shaft.load", "values": [0.3]}]}, {"cases": [{"points": "shaft.load\n0.9\n"}]}):
+        old, new = extend({**GRID, "/name": "feeder"}, addition)
+        assert (old.name, new.name) == ("feeder", "feeder, extended")
+
+
 def test_further_cases_come_after_those_there_are() -> None:
     addition = {"cases": [{"points": "excitation.frequency,shaft.load\n16,0.02\n17,0.9\n"}]}
     old, new = extend(GRID, addition)
