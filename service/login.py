@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 from urllib.parse import urlsplit
 
 #: Default address of `sprag serve`.
@@ -15,8 +15,26 @@ DEFAULT_SERVER: Final = "http://127.0.0.1:8000"
 _PORTS: Final = {"http": 80, "https": 443}
 
 
-def service_of(server: str | None, token: str | None) -> tuple[str, str | None]:
-    """The address of the service and its token.
+#: Where a token comes from.
+GIVEN: Final = "--token"
+VARIABLE: Final = "SPRAG_TOKEN"
+LOGIN: Final = "`sprag login`"
+
+
+class Access(NamedTuple):
+    """A service and its token: ``origin`` is one of `GIVEN`, `VARIABLE` and `LOGIN`, or "" without a token.
+
+    ``takes_variable`` is false for the service of a login that SPRAG_SERVER does not name: SPRAG_TOKEN is not for it.
+    """
+
+    server: str
+    token: str | None
+    origin: str
+    takes_variable: bool
+
+
+def access_of(server: str | None, token: str | None) -> Access:
+    """The address of the service, its token, and where that comes from.
 
     What is given comes first, then ``SPRAG_SERVER`` and ``SPRAG_TOKEN``, then the login. A token that is kept is for
     the service of the same login only: it is sent to no other. ``SPRAG_TOKEN``, which may be the secret of a service
@@ -30,19 +48,14 @@ def service_of(server: str | None, token: str | None) -> tuple[str, str | None]:
     """
     named, kept = os.environ.get("SPRAG_SERVER", ""), profile()
     chosen = (named or kept.get("server") or DEFAULT_SERVER) if server is None else server
+    of_login = _is_of(chosen, kept)
+    takes = not of_login or _place(chosen) == _place(named)
     if token is not None:
-        return chosen, token
-    secret = os.environ.get("SPRAG_TOKEN") if _takes_variable(chosen, kept) else None
-    return chosen, secret or (kept.get("token", "") if _is_of(chosen, kept) else None)
-
-
-def takes_variable(address: str) -> bool:
-    """Whether ``SPRAG_TOKEN`` is for the service at an address: not of a login, unless ``SPRAG_SERVER`` names it."""
-    return _takes_variable(address, profile())
-
-
-def _takes_variable(address: str, kept: Mapping[str, str]) -> bool:
-    return not _is_of(address, kept) or _place(address) == _place(os.environ.get("SPRAG_SERVER", ""))
+        return Access(chosen, token, GIVEN if token else "", takes)
+    if takes and (secret := os.environ.get(VARIABLE)):
+        return Access(chosen, secret, VARIABLE, takes)
+    own = kept.get("token", "") if of_login else None
+    return Access(chosen, own, LOGIN if own else "", takes)
 
 
 def _is_of(address: str, kept: Mapping[str, str]) -> bool:

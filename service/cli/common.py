@@ -6,10 +6,13 @@ has kept; a service of the login gets the token of the login.
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
 from contextvars import ContextVar
 from dataclasses import dataclass
 
-from sprag_study.service.login import service_of
+from sprag_study.service.languages import _
+from sprag_study.service.login import GIVEN, LOGIN, VARIABLE, Access, access_of, profile
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +32,19 @@ def wants_json() -> bool:
     return CURRENT.get().json
 
 
-def address() -> tuple[str, str | None]:
+def access() -> Access:
     """The address of the service and its token (`sprag_study.service.login`), an option before anything else."""
     given = CURRENT.get()
-    return service_of(given.server or None, given.token or None)
+    return access_of(given.server or None, given.token or None)
+
+
+def token_sentences(access: Access) -> Iterator[str]:
+    """Which token the service gets, and which one it does not get although it is there."""
+    origin = access.origin
+    yield _("The token is that of {origin}.", origin=origin) if origin else _("No token is sent.")
+    if origin == GIVEN:
+        return
+    if os.environ.get(VARIABLE) and origin != VARIABLE:
+        yield _("SPRAG_TOKEN is not sent to the service of `sprag login`, unless SPRAG_SERVER names it, too.")
+    if profile().get("token") and origin != LOGIN:
+        yield _("The token of `sprag login` is for its service only, and where SPRAG_TOKEN is sent, it comes first.")

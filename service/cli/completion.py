@@ -144,14 +144,15 @@ def _of_study(context: typer.Context, parts: Sequence[str]) -> list[tuple[str, s
 
 def _asked(context: typer.Context, ask: Callable[[Client], list[Offered]]) -> list[Offered]:
     """What the service of the command answers; nothing where none answers."""
-    from sprag_study.service.cli.common import CURRENT, Common, address
+    from sprag_study.service.cli.common import CURRENT, Common, access
     from sprag_study.service.cli.console import CommandFailureError
     from sprag_study.service.client import Client, RefusedError, UnreachableError
 
     typed = context.find_root().params
     before = CURRENT.set(Common(typed.get("server"), typed.get("token")))
     try:
-        with Client(*address(), retry=0.0, timeout=_TIMEOUT) as client:
+        service = access()
+        with Client(service.server, service.token, retry=0.0, timeout=_TIMEOUT) as client:
             return ask(client)
     except (CommandFailureError, RefusedError, UnreachableError, ValueError):  # ValueError: the address of the service
         return []

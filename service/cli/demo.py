@@ -21,6 +21,7 @@ from sprag_study.service.cli.files import file_failure, write_pieces
 from sprag_study.service.cli.following import follow
 from sprag_study.service.cli.remote import served_by
 from sprag_study.service.languages import N_, _, decimal
+from sprag_study.service.login import access_of
 
 if TYPE_CHECKING:
     from sprag_study.service.client import Client
@@ -49,7 +50,7 @@ def demo(
         target.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise file_failure(target, error) from error
-    with _service(target / "sprag.sqlite3") as (address, process), served_by(address) as client:
+    with _service(target / "sprag.sqlite3") as (address, process), served_by(access_of(address, None)) as client:
         study = _show(client, target / "curve.png")
         if not leave:
             say(_("Open {address} (Ctrl-C ends the service).", address=address + study["links"]["page"]))

@@ -16,7 +16,7 @@ from typing import Annotated, Any
 
 import typer
 
-from sprag_study.service.cli.common import wants_json
+from sprag_study.service.cli.common import access, token_sentences, wants_json
 from sprag_study.service.cli.configured import read_settings
 from sprag_study.service.cli.console import ExitCode, WrongInputError, console, write_json, write_text
 from sprag_study.service.cli.options import Database
@@ -131,6 +131,7 @@ def _checks(db: str | None) -> dict[str, Callable[[], tuple[bool, str]]]:
         _("workers"): lambda: _workers(url, file),
         _("schedules"): lambda: _schedules(url, file),
         _("alerts"): lambda: _alerts(url, file),
+        _("service of commands"): _access,
         **here,
         _("kernel cache"): _cache,
         _("engine"): _known_values,
@@ -272,6 +273,14 @@ def _alerts(url: str, file: Path | None) -> tuple[bool, str]:
     with Store.open(url, create=False) as store:
         alerts = store.alerts.present()
     return not alerts, " ".join(shown_stored(alert.problem) for alert in alerts) or _("none")
+
+
+def _access() -> tuple[bool, str]:
+    """Which service commands ask, and with which token."""
+    from sprag_study.service.client.wire import public
+
+    asked = access()
+    return True, " ".join([public(asked.server), *token_sentences(asked)])
 
 
 def _disk(location: Path) -> tuple[bool, str]:

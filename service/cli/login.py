@@ -13,7 +13,7 @@ from sprag_study.service.cli.common import CURRENT, wants_json
 from sprag_study.service.cli.console import say, write_json
 from sprag_study.service.cli.remote import served_by
 from sprag_study.service.languages import _
-from sprag_study.service.login import profile_file
+from sprag_study.service.login import GIVEN, LOGIN, VARIABLE, Access, profile_file
 
 
 def login(
@@ -23,8 +23,10 @@ def login(
 
     The token is that of --token or SPRAG_TOKEN, or it is asked for; an empty one is none.
     """
-    token = CURRENT.get().token or os.environ.get("SPRAG_TOKEN") or _asked()
-    with served_by(server, token) as client:
+    given, secret = CURRENT.get().token, os.environ.get(VARIABLE)
+    token = given or secret or _asked()
+    origin = GIVEN if given else VARIABLE if secret else LOGIN if token else ""
+    with served_by(Access(server, token, origin, takes_variable=True)) as client:
         me = client.me()
     file = profile_file()
     file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)

@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from sprag_study.service.storage.people.people import People
 
 
-def study_of(client: Client, text: str) -> str:
+def study_of(client: Client, text: str, *, deleted: bool = False) -> str:
     """The id of the study that is meant, as the client finds it; WrongInputError where several fit or none is named."""
     from sprag_study.service.client.synchronous import naming
 
     with _one("ID", text, _("the id or name of a study, or latest"), _("the study is not unique")):
-        return naming.study_of(client, text)
+        return naming.study_of(client, text, deleted=deleted)
 
 
 def schedule_of(client: Client, text: str) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from sprag_study.service.cli.common import address, wants_json
+from sprag_study.service.cli.common import access, token_sentences, wants_json
 from sprag_study.service.cli.console import (
     CommandFailureError,
     TroubleError,
@@ -36,8 +36,8 @@ from sprag_study.service.cli.options import (
 )
 from sprag_study.service.cli.sources import SpecOrStudy, is_study, refuse_local
 from sprag_study.service.faults import Fault, Kind
-from sprag_study.service.languages import N_, _, earlier
-from sprag_study.service.login import takes_variable
+from sprag_study.service.languages import _, earlier
+from sprag_study.service.login import Access
 from sprag_study.worker.limits import MAX_BODY_BYTES, MAX_PRIORITY
 
 if TYPE_CHECKING:
@@ -56,14 +56,13 @@ PriorityOption = Annotated[
 @contextmanager
 def connection() -> Iterator[Client]:
     """A client of the service of the command; its errors become failures of the command."""
-    server, token = address()
-    with served_by(server, token, variable=takes_variable(server)) as client:
+    with served_by(access()) as client:
         yield client
 
 
 @contextmanager
-def served_by(server: str, token: str | None = None, *, variable: bool = True) -> Iterator[Client]:
-    """A client of a service; its errors become failures of the command, ``variable`` as in `refusal`."""
+def served_by(access: Access) -> Iterator[Client]:
+    """A client of a service; its errors become failures of the command."""
     from sprag_study.service.client import (
         ArgumentError,
         Client,
@@ -74,7 +73,7 @@ def served_by(server: str, token: str | None = None, *, variable: bool = True) -
     )
 
     try:
-        client = Client(server, token)
+        client = Client(access.server, access.token)
     except ValueError as error:
         raise WrongInputError("invalid-parameter", str(error)) from error
     with client:
@@ -96,23 +95,23 @@ def served_by(server: str, token: str | None = None, *, variable: bool = True) -
                 ),
             ) from error
         except RefusedError as error:
-            raise refusal(error, variable=variable) from error
+            raise refusal(error, access) from error
         except ArgumentError as error:
             raise WrongInputError("invalid-parameter", _("invalid argument"), error.faults) from error
         except StudyTimeoutError as error:
             raise TroubleError("not-done", _("{what}; it continues.", what=error)) from error
 
 
-def refusal(error: RefusedError, *, variable: bool = True) -> CommandFailureError:
-    """The failure of the command for a refusal of the service; ``variable``: a token of SPRAG_TOKEN would be sent."""
+def refusal(error: RefusedError, access: Access | None = None) -> CommandFailureError:
+    """The failure of the command for a refusal; of a service, with advice about its token."""
     kind = cast("Kind", error.code)
-    if error.status == 401:
+    if error.status == 401 and access is not None:
         advice = (
-            N_("{refusal} Give the service's token with --token or in SPRAG_TOKEN, or keep it with `sprag login`.")
-            if variable
-            else N_("{refusal} Give the service's token with --token, or log in again with `sprag login`.")
+            _("Give the service's token with --token or in SPRAG_TOKEN, or keep it with `sprag login`.")
+            if access.takes_variable
+            else _("Give the service's token with --token, or log in again with `sprag login`.")
         )
-        return TroubleError(kind, _(advice, refusal=earlier.said(_(error.detail))))
+        return TroubleError(kind, " ".join([earlier.said(_(error.detail)), *token_sentences(access), advice]))
     if error.status in (403, 421) or error.status >= 500:
         return TroubleError(kind, error.detail)
     faults = [

@@ -33,7 +33,7 @@ _PLAIN: Final = {
     "pause": N_("Hold a study: running cases are finished, no new ones are started."),
     "resume": N_("Resume a study that is held; a past deadline or a closed window no longer applies."),
     "cancel": N_("Cancel a study; finished cases are kept."),
-    "restore": N_("Undo the deletion of a study, named by its whole id, as `sprag list --deleted` has it."),
+    "restore": N_("Undo the deletion of one of the studies of `sprag list --deleted`; latest: the one deleted last."),
 }
 
 
@@ -56,7 +56,8 @@ def _act(study_id: str, verb: str, query: Query = ()) -> None:
     from sprag_study.service.client.wire import study_path
 
     with connection() as client:
-        study = client.request("POST", f"{study_path(study_of(client, study_id))}:{verb}", params=list(query))
+        named = study_of(client, study_id, deleted=verb == "restore")
+        study = client.request("POST", f"{study_path(named)}:{verb}", params=list(query))
     show_study(study)
 
 

@@ -30,7 +30,7 @@ from sprag_study.service.client.wire import (
     study_path,
     unanswered,
 )
-from sprag_study.service.login import service_of
+from sprag_study.service.login import access_of
 
 
 class AsyncConnection:
@@ -68,7 +68,7 @@ class AsyncConnection:
         timeout: float | None = None,
         transport: httpx.AsyncBaseTransport | None = None,
     ) -> None:
-        chosen, secret = service_of(server, token)
+        chosen, secret, *_ = access_of(server, token)
         self._http = httpx.AsyncClient(transport=transport, **connection_options(chosen, secret))
         self.server = public(chosen)
         self.retry, self._timeout, self._open_to_all = retry, timeout, token == ""

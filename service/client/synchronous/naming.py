@@ -15,23 +15,28 @@ if TYPE_CHECKING:
 LATEST: Final = "latest"
 _WHOLE_ID: Final = re.compile(r"(st|sc)_[0-9a-f]{16,}")
 _PAGE: Final = "500"
+_DELETED: Final = ("deleted", "true")
 
 
-def study_of(connection: Connection, text: str) -> str:
+def study_of(connection: Connection, text: str, *, deleted: bool = False) -> str:
     """The id of the study that is meant: ``latest``, an id or the beginning of one, a name or the beginning of one.
 
     A text that fits no study is returned unchanged, and the service refuses it. Raises AmbiguousError where several
-    studies fit; a whole name precedes the beginning of others. ArgumentError for an empty text.
+    studies fit; a whole name precedes the beginning of others. ArgumentError for an empty text. With ``deleted``, one
+    of the studies that are deleted and can be restored is meant; ``latest`` was deleted last.
     """
     if _WHOLE_ID.fullmatch(named("study_id", text)):
         return text
+    if text == LATEST and deleted:
+        purged = {s["id"]: s["purge_at"] for s in connection.items("/studies", "studies", [_DELETED])}
+        return max(purged, key=lambda study_id: str(purged[study_id]), default=text)
     if text == LATEST:
         newest = (connection.request("GET", "/studies", params=[("page_size", "1")]))["studies"]
         return str(newest[0]["id"]) if newest else text
     # Every study that fits contains the words of the text; archived ones are found too.
     asked = [("page_size", _PAGE), ("search", text[:MAX_SEARCH_LENGTH])]
     studies = []
-    for more in ([], [("archived", "true")]):
+    for more in ([_DELETED],) if deleted else ([], [("archived", "true")]):
         for s in connection.items("/studies", "studies", [*asked, *more]):
             studies.append(Named(s["id"], s["name"], f"{s['id']} ({s['name'] or s['model']})"))
     return meant(text, studies, "studies", "st_")

@@ -92,6 +92,19 @@ def test_a_study_is_deleted_after_asking(service: Service, sprag: Sprag, here: N
     assert service.http.get(f"{API}/studies/{study_id}").status_code == 404
 
 
+def test_the_study_that_was_deleted_last_is_restored(
+    service: Service, sprag: Sprag, here: None, spec: dict[str, Any]
+) -> None:
+    first, second, there = (submit(service, spec, name) for name in ("first", "second", "there"))
+    for study_id in (first, second, there):
+        service.fill(study_id)
+    assert sprag("study", "restore", "latest").code == 2, "none is deleted"
+    for study_id in (second, first):
+        assert sprag("study", "delete", study_id, "--yes").code == 0
+    for named, study_id in (("latest", first), ("second", second)):
+        assert sprag("study", "restore", named).out == f"{study_id}\n"
+
+
 def test_a_deleted_study_is_deleted_for_good_by_its_whole_id(
     service: Service, sprag: Sprag, here: None, spec: dict[str, Any]
 ) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from sprag_study.service.cli.remote import refusal
 from sprag_study.service.client import RefusedError
+from sprag_study.service.login import Access
 
 
 def test_parameters_are_called_as_the_options_are() -> None:
@@ -28,7 +29,8 @@ def test_fields_of_a_spec_keep_their_pointers_and_messages() -> None:
 
 
 def test_a_missing_token_is_asked_for_by_its_variable() -> None:
-    failure = refusal(RefusedError(401, {"detail": "This request carries no valid token."}))
+    access = Access("http://a", None, "", takes_variable=True)
+    failure = refusal(RefusedError(401, {"detail": "This request carries no valid token."}), access)
     assert failure.exit_code == 3
     assert "--token" in failure.detail
     assert "SPRAG_TOKEN" in failure.detail

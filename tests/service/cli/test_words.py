@@ -166,13 +166,18 @@ def test_a_login_keeps_address_and_token_for_its_service_only(
         study = sprag("list", "--json")
         assert study.code == 0, study.err
         monkeypatch.setenv("SPRAG_SERVER", "http://elsewhere.example")
-        assert common.address() == ("http://elsewhere.example", None), "a token is sent to no other service"
+        assert common.access()[:2] == ("http://elsewhere.example", None), "a token is sent to no other service"
         monkeypatch.delenv("SPRAG_SERVER")
         monkeypatch.setenv("SPRAG_TOKEN", "wrong")
         login.write_text(json.dumps({"server": address, "token": "revoked"}))
-        told = sprag("list").err
-        assert "log in again with `sprag login`" in told
-        assert "SPRAG_TOKEN" not in told, "it is not sent there"
+        refused = sprag("list").err
+        assert "log in again with `sprag login`" in refused
+        assert "The token is that of `sprag login`. SPRAG_TOKEN is not sent to the service of `sprag login`" in refused
+        assert sprag("list", "--token", "no").err.count("SPRAG_TOKEN") == 0, "nothing is left out"
+        monkeypatch.setenv("SPRAG_SERVER", address)
+        refused = sprag("list").err
+        assert "The token is that of SPRAG_TOKEN. The token of `sprag login` is for its service only" in refused
+        monkeypatch.delenv("SPRAG_SERVER")
         assert "in SPRAG_TOKEN" in sprag("login", address).err, "which sends it"
         monkeypatch.delenv("SPRAG_TOKEN")
         assert sprag("logout").code == 0
@@ -227,11 +232,22 @@ def test_the_secret_of_this_machine_is_not_sent_to_the_service_of_a_login(
     login.parent.mkdir(parents=True)
     for kept, sent in (({}, ""), ({"token": "kept"}, "kept")):
         login.write_text(json.dumps({"server": "http://far.example", **kept}))
-        assert common.address() == ("http://far.example", sent)
+        assert common.access()[:2] == ("http://far.example", sent)
     monkeypatch.setenv("SPRAG_SERVER", "http://near.example")
-    assert common.address() == ("http://near.example", "a-secret-of-this-machine")
+    assert common.access()[:2] == ("http://near.example", "a-secret-of-this-machine")
     with Client("http://far.example", "") as client:
         assert "authorization" not in client._http.headers
+
+
+def test_the_doctor_says_which_token_is_sent(login: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = doctor._access()
+    assert sound == (True, f"{DEFAULT_SERVER} No token is sent.")
+    monkeypatch.setenv("SPRAG_TOKEN", "a-secret-of-this-machine")
+    login.parent.mkdir(parents=True)
+    login.write_text(json.dumps({"server": "http://anna:very-secret@far.example"}))
+    sound, text = doctor._access()
+    assert (sound, "very-secret" in text) == (True, False)
+    assert text.startswith("http://far.example No token is sent. SPRAG_TOKEN is not sent to the service of")
 
 
 def test_no_command_shows_the_password_of_an_address(
@@ -259,4 +275,4 @@ def test_an_address_that_is_none_is_refused(sprag: Sprag, monkeypatch: pytest.Mo
 def test_a_damaged_login_is_none(login: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     login.parent.mkdir(parents=True)
     login.write_text("not JSON")
-    assert common.address() == (DEFAULT_SERVER, None)
+    assert common.access()[:2] == (DEFAULT_SERVER, None)
