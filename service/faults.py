@@ -218,14 +218,19 @@ class Fault:
     allowed: str | None = None
     unit: str | None = None
 
+    @property
+    def unit_to_tell(self) -> str | None:
+        """The unit, where there is one that ``allowed`` does not name already."""
+        return None if self.unit in {None, "1"} or (self.unit or "") in (self.allowed or "") else self.unit
+
     def __str__(self) -> str:
         details = []
         if self.value is not None:
             details.append(f"got {self.value!r}" if isinstance(self.value, str) else f"got {self.value}")
         if self.allowed is not None:
             details.append(f"allowed: {self.allowed}")
-        if self.unit is not None and (self.allowed is None or self.unit not in self.allowed):
-            details.append(f"unit {self.unit}")
+        if self.unit_to_tell:
+            details.append(f"unit {self.unit_to_tell}")
         where = self.where or "(the whole spec)"
         return f"{where}: {self.message}" + (f" ({'; '.join(details)})" if details else "")
 

@@ -118,8 +118,8 @@ def fault_line(fault: Fault) -> str:
         details.append(_("got {value}", value=repr(value) if isinstance(value, str) else value))
     if fault.allowed is not None:
         details.append(_("allowed: {allowed}", allowed=allowed_text(fault.allowed)))
-    if fault.unit is not None and (fault.allowed is None or fault.unit not in fault.allowed):
-        details.append(_("unit {unit}", unit=unit_text(fault.unit)))
+    if fault.unit_to_tell:
+        details.append(_("unit {unit}", unit=unit_text(fault.unit_to_tell)))
     where = fault.where or _("(the whole spec)")
     return f"{where}: {fault_text(fault)}" + (f" ({'; '.join(details)})" if details else "")
 

@@ -55,3 +55,8 @@ def unit_list(units: Iterable[str]) -> Sentence:
 def quoted(names: Iterable[str]) -> str:
     """Choices of a spec: ``'grid', 'zip'``."""
     return ", ".join(f"'{name}'" for name in names)
+
+
+def number_in(unit: str) -> Sentence:
+    """``a number of N*m``; ``a plain number`` where there is no unit."""
+    return Sentence("a plain number") if unit == "1" else Sentence("a number of {unit}", unit=Typed(unit))

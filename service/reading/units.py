@@ -57,8 +57,8 @@ _EXAMPLES: Final = {
 PERCENT: Final = frozenset({"%", "percent", "per cent"})
 _PER_MINUTE: Final = Fraction(1, 60)
 _QUANTITY: Final = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?)\s*(.*)", re.DOTALL)
-#: Fractions of two whole numbers, as of inches: "3/4 in".
-_FRACTION: Final = re.compile(r"([+-]?[0-9]{1,3})/([1-9][0-9]{0,2})(?![0-9.,/])\s*(.*)", re.DOTALL)
+#: Fractions of two whole numbers, as of inches: "3/4 in"; also ratios and irregularities, "17/53" and "1/80".
+_FRACTION: Final = re.compile(r"([+-]?[0-9]{1,5})/([1-9][0-9]{0,4})(?![0-9.,/])\s*(.*)", re.DOTALL)
 _LETTERS: Final = "%A-Za-zµ°А-Яа-яЁёІіЇїЄєҐґ"
 _TOKEN: Final = re.compile(
     rf"\s*(?:(?P<name>[{_LETTERS}][{_LETTERS}_0]*)|(?:\*\*|\^)\s*(?P<power>[+-]?[0-9]{{1,2}})(?![0-9])"
@@ -150,7 +150,12 @@ def parse_exact(value: object, unit: str) -> Fraction:
         number, text = split_quantity(value)
         if text in PERCENT:
             return number / 100
-        raise QuantityError("wrong-type", "must be a plain number, without a unit or quotation marks")
+        if not text and "/" in value:
+            return number
+        raise QuantityError(
+            "wrong-type",
+            N_('must be a number without quotation marks, a share such as "5 %" or a fraction such as "1/80"'),
+        )
     if isinstance(value, str):
         number, text = split_quantity(value)
         if not text:

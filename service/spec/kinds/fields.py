@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag_study.sentences import Sentence, Typed
+from sprag_study.sentences import Sentence
 from sprag_study.service.reading.catalogue import result_of, unknown_result
-from sprag_study.service.reading.limits import quoted
+from sprag_study.service.reading.limits import number_in, quoted
 from sprag_study.service.reading.texts import quantity_text
 from sprag_study.service.reading.units import example, parse_quantity
 from sprag_study.service.spec.axes.axes import read_paths
@@ -78,5 +78,5 @@ def read_value(node: Node, info: ResultInfo) -> float | None:
             return float(info.categories.index(str(node.value)))
         node.refuse("invalid-choice", "is not a valid choice", allowed=quoted(info.categories))
         return None
-    such = Sentence("a number of {unit}, for example {example}", unit=Typed(info.unit), example=example(info.unit))
+    such = Sentence("{number}, for example {example}", number=number_in(info.unit), example=example(info.unit))
     return node.parsed(lambda value: parse_quantity(value, info.unit), allowed=such, unit=info.unit)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 from sprag_study.sentences import Sentence, Typed
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.catalogue import result_of
+from sprag_study.service.reading.limits import number_in
 from sprag_study.service.reading.numbers import parse_number
 from sprag_study.service.reading.texts import did_you_mean, shorten_text
 from sprag_study.service.reading.units import QuantityError, parse_quantity
@@ -179,7 +180,7 @@ def _value(node: Node, row: CsvRow, column: Column, unit: str) -> float:
     try:
         return _number(column.cell(row), column, unit) + 0.0
     except QuantityError as error:
-        refuse_cell(node, row, column, error, Sentence("a number of {unit}", unit=Typed(unit)), unit)
+        refuse_cell(node, row, column, error, number_in(unit), unit)
         return math.nan
 
 
