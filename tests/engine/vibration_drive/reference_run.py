@@ -156,24 +156,22 @@ class Drive(Automaton):
         ] if event > t else y
 
     def watch(self, times: Floats, values: Floats, dense: Any) -> None:
-        """Extrema within the step: the best sample, then the dense output around it."""
+        """Extrema within the step: the best sample, then thrice the best one of the dense output around it."""
         if not self.watching or times[-1] <= times[0]:
             return
-        series = self.watched(times, values)
-        for name, q in series.items():
+        for name, q in self.watched(times, values).items():
             k = int(np.argmax(q))
             known = self.out.largest.get(name, -math.inf)
-            low, high = max(0, k - 1), min(len(q) - 1, k + 1)
             # At the edge of a step the peak may lie between two samples that are alike: look at the next one too.
             lowest = np.min(q[max(0, k - 2) : k + 3])
             if q[k] + (q[k] - lowest) > known:
-                best = minimize_scalar(
-                    lambda s, name=name: -float(self.watched(s, dense(s))[name]),
-                    bounds=(times[low], times[high]),
-                    method="bounded",
-                    options={"xatol": 1e-7 * (times[high] - times[low])},
-                )
-                self.out.largest[name] = max(known, float(q[k]), -float(best.fun))
+                peak, around = float(q[k]), times
+                for _ in range(3):
+                    around = np.linspace(around[max(0, k - 1)], around[min(len(around) - 1, k + 1)], 2 * SAMPLES)
+                    finer = self.watched(around, dense(around))[name]
+                    k = int(np.argmax(finer))
+                    peak = max(peak, float(finer[k]))
+                self.out.largest[name] = max(known, peak)
 
     def watched(self, t: Any, y: Any) -> dict[str, Any]:
         """Quantities whose largest value is wanted (minima as the negative)."""
