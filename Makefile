@@ -12,7 +12,9 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input --quiet --qui
 # The tests start many processes: compiling all modules anew in each would be a third of their time.
 unexport PYTHONDONTWRITEBYTECODE
 
+# mypy, which comes first, takes as long as the others and the kernels together.
 CHECKS := mypy ruff imports reference catalogues collect
+SIDE_BY_SIDE = $(MAKE) --no-print-directory --jobs 2 $(if $(filter output-sync,$(.FEATURES)),--output-sync)
 
 .PHONY: help demo test check kernels bounds serve docs dist clean $(CHECKS)
 
@@ -45,12 +47,12 @@ dist: docs
 
 # The tests of one file share processes and servers, so they stay together, as do some files (TOGETHER in tests/conftest.py).
 # Many wait for processes of the program, so that three run side by side even on two cores.
-test: check kernels
+test: $(DEV)
+	@$(SIDE_BY_SIDE) $(CHECKS) kernels
 	$(BIN)/python -m pytest --numprocesses 3 --dist loadfile --no-loadscope-reorder
 
-# mypy takes as long as the others together.
 check: $(DEV)
-	@$(MAKE) --no-print-directory --jobs 2 $(if $(filter output-sync,$(.FEATURES)),--output-sync) $(CHECKS)
+	@$(SIDE_BY_SIDE) $(CHECKS)
 
 ruff: $(DEV)
 	$(BIN)/ruff check .
