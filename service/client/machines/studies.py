@@ -56,6 +56,7 @@ class Studies(Draft):
         best: Results | None = None,
         subject_to: Results | None = None,
         at: Sequence[Any] | None = None,
+        start: Sequence[Any] | None = None,
         over: Literal["worst", "mean"] | None = None,
         population: int | None = None,
         generations: int | None = None,
@@ -74,6 +75,9 @@ class Studies(Draft):
             What a feasible design must fulfil.
         at : values, optional
             Parameters of each operating point; by default one, that of the base.
+        start : values, optional
+            Known designs, which the first generation has: the values of what varies, by default those of `base`: {} is
+            the design of `base`.
         over : values, optional
             What counts of several operating points: the worst one, or the mean.
         population : int, optional
@@ -91,6 +95,7 @@ class Studies(Draft):
                 best=results_of(best),
                 subject_to=results_of(subject_to),
                 at=at,
+                start=start,
                 over=over,
                 population=population,
                 generations=generations,

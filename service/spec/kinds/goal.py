@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag_study.sentences import Place, Sentence, joined
-from sprag_study.service.reading.limits import at_most_cases
+from sprag_study.sentences import Amount, Place, Sentence, joined, plural
+from sprag_study.service.languages import N_
+from sprag_study.service.reading.limits import at_most_cases, span
 from sprag_study.service.reading.texts import did_you_mean
 from sprag_study.service.spec.axes.axes import PATHS, check_paths, expand
 from sprag_study.service.spec.axes.values import plan_values
@@ -25,6 +26,7 @@ from sprag_study.service.spec.lists import refuse_mixed
 from sprag_study.service.spec.schema.quantity import QUANTITY
 from sprag_study.service.spec.shares import in_percent
 from sprag_study.worker.limits import MAX_PLANNED_CASES
+from sprag_study.worker.planning.goals.plan import Variable
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -80,6 +82,12 @@ GOAL: Final = Record(
         "at": Listed(
             "operating points", 0, 64, "parameters of each operating point; by default one, that of the base",
             item={"type": "object", "minProperties": 1, "additionalProperties": QUANTITY},
+        ),
+        "start": Listed(
+            "known designs", 0, 1000,
+            "known designs, which the first generation has: the values of what varies, by default those of `base`: {} "
+            "is the design of `base`",
+            item={"type": "object", "additionalProperties": QUANTITY},
         ),
         "over": choice(
             "over", "what counts of several operating points: the worst one, or the mean", "worst", "mean",
@@ -216,8 +224,59 @@ def read_goal(
             message = joined(", ", (message, each))
         goal["generations"].refuse("too-many", message, search["generations"], allowed=at_most_cases(MAX_PLANNED_CASES))
         return None
+    start = read_start(goal, variables, search["population"])
+    if start is None:
+        return None
     plan = {"kind": "goal", "vary": variables, "best": best, "subject_to": constraints, "at": points, **search}
-    return plan | ({"drives": drives} if drives else {})
+    return plan | ({"drives": drives} if drives else {}) | ({"start": start} if start else {})
+
+
+def read_start(goal: Node, variables: Variables, population: int) -> list[list[float]] | None:
+    """The known designs: the value (SI) of each variable; None, and the faults recorded, if invalid."""
+    node, items = goal["start"], GOAL.items(goal, "start")
+    _refuse_mixed_points(items)
+    if len(items) > population:
+        message = plural("has {count} design", "has {count} designs", len(items))
+        allowed = Sentence("at most those of one generation, {population}", population=population)
+        node.refuse("too-many", message, None, allowed=allowed)
+    known = [Variable.from_json(variable) for variable in variables]
+    read = [_read_design(item, known) for item in (items if node.sound else ())]
+    return [design for design in read if design is not None] if node.sound else None
+
+
+def _read_design(item: Node, variables: Sequence[Variable]) -> list[float] | None:
+    """One known design; None, and the faults recorded, where it is invalid."""
+    if not isinstance(item.value, Mapping):
+        item.refuse("wrong-type", "must be an object", allowed='as in {"pendulums.0.arm": "30 mm"}, or {}')
+        return None
+    paths = [path for variable in variables for path in variable.paths]
+    for path in item.value:
+        if path not in paths:
+            item[path].refuse("invalid-path", "does not vary", path, allowed=", ".join(paths))
+    values = [_read_known(item, variable) for variable in variables]
+    known = [value for value in values if value is not None]
+    return known if len(known) == len(variables) and item.sound else None
+
+
+def _read_known(item: Node, variable: Variable) -> float | None:
+    """The value of a variable, by default that of the base; None, and a fault recorded, where it is invalid."""
+    parameters, base, name = item.machine.parameters, item.machine.values, " = ".join(variable.paths)
+    place = next((item[path] for path in variable.paths if path in item), item)
+    given = {item[path].number(parameters[path]) for path in variable.paths if path in item}
+    numbers = given or {base[path] for path in variable.paths if path in base}
+    if len(numbers) != 1:
+        several = Sentence("{path} has several values", path=name)
+        missing = Sentence("{path} has no nominal value in `base`", path=name)
+        place.refuse("conflict" if numbers else "required", several if numbers else missing, None)
+        return None
+    value = numbers.pop()
+    if value is not None and not variable.has(value):
+        unit = parameters[variable.paths[0]].unit
+        told = Sentence("{path} = {value} is outside of what varies", path=name, value=Amount(value, unit, 6))
+        ends = span(*(Amount(end, unit, 6) for end in (variable.low, variable.high)))
+        place.refuse("out-of-range", told, None, allowed=N_("one of its `values`") if variable.values else ends)
+        return None
+    return value
 
 
 def _read_best(items: Sequence[Node]) -> list[dict[str, Any]]:

@@ -32,9 +32,10 @@ PLAN: dict[str, Any] = {
 }
 
 
-def test_a_plan_comes_back_from_its_json() -> None:
-    plan = GoalPlan.from_json(json.loads(json.dumps(PLAN)))
-    assert plan.to_json() == PLAN
+@pytest.mark.parametrize("more", [{}, {"start": [[0.0015, 0.03], [0.003, 0.02]]}])
+def test_a_plan_comes_back_from_its_json(more: dict[str, Any]) -> None:
+    plan = GoalPlan.from_json(json.loads(json.dumps(PLAN | more)))
+    assert plan.to_json() == PLAN | more
     assert GoalPlan.from_json(plan.to_json()) == plan
 
 

@@ -45,6 +45,41 @@ def _plans() -> dict[str, GoalPlan]:
     }
 
 
+def _needle(points: Floats) -> dict[str, Floats]:
+    """Best at one design, whose surroundings do not tell of it."""
+    there = (points == NEEDLE).all(axis=1)
+    away = ((points - 0.5) ** 2).sum(axis=1)
+    return {"f": np.where(there, -1.0, away), "g": np.where(there, -1.0, 1.0 - away)}
+
+
+#: Values that their coordinates do not give back: 1 + 6 x ((v - 1) / 6).
+NEEDLE = np.array([1.1, 0.9, 4.0])
+KNOWN = (Variable(("a",), 1.0, 7.0), Variable(("b",), -0.3, 1.7), Variable(("c",), 1.0, 7.0, (1.0, 2.0, 4.0, 7.0)))
+
+
+@pytest.mark.parametrize("goals", [["f"], ["f", "g"], []])
+def test_known_designs_are_in_the_first_generation_and_never_lost(goals: list[str]) -> None:
+    limit = () if goals else (Limit("f", "at_most", 0.0),)
+    start = ((6.7, 1.7, 1.0), tuple(NEEDLE.tolist()))
+    plan = plan_of(KNOWN, goals, subject_to=limit, start=start)
+    planner, rounds = searched(plan, _needle)
+    assert rounds[0].points[:2].tolist() == [list(one) for one in start]
+    assert len(rounds[0].points) == plan.population
+    assert planner.best()[0][0].tolist() == NEEDLE.tolist()
+    assert not (searched(plan_of(KNOWN, goals, subject_to=limit), _needle)[0].best()[0] == NEEDLE).all(axis=1).any()
+    again = GoalPlanner(plan)
+    for rows in rounds:
+        assert again.ask().points.tobytes() == rows.points.tobytes()
+        again.tell(rows)
+
+
+def test_a_catalogue_smaller_than_its_known_designs_is_searched_whole() -> None:
+    values = Variable(("a",), 1.0, 3.0, (1.0, 2.0, 3.0))
+    planner, rounds = searched(plan_of((values,), ["f"], start=((3.0,), (3.0,), (1.0,))), _one)
+    assert sorted(joined(rounds).points[:, 0].tolist()) == [1.0, 2.0, 3.0]
+    assert planner.best()[0][0].tolist() == [1.0]
+
+
 @pytest.mark.parametrize("name", _plans())
 def test_a_planner_told_the_same_rounds_asks_for_the_same_points(name: str) -> None:
     plan = _plans()[name]

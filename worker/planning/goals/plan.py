@@ -42,6 +42,20 @@ class Variable:
     high: float
     values: tuple[float, ...] = ()
 
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Variable:
+        """The variable as the plan has it; ValueError for an empty catalogue."""
+        paths = tuple(str(path) for path in data["paths"])
+        if "values" in data:
+            values = tuple(sorted({float(value) for value in data["values"]}))
+            _check(bool(values), "vary.values", [], "at least one value")
+            return cls(paths, values[0], values[-1], values)
+        return cls(paths, float(data["low"]), float(data["high"]))
+
+    def has(self, value: float) -> bool:
+        """Whether a value (SI) is one that it may have."""
+        return value in self.values if self.values else self.low <= value <= self.high
+
 
 class _Quantity:
     """What a goal or a limit is about: a result, a quantile of it over the drawn drives, or a yield."""
@@ -156,6 +170,8 @@ class GoalPlan:
         Whether equalities are met to 1e-6 by further rounds after the last generation.
     drives : int
         Drawn drives of each design at each operating point, beside the nominal one; 0 without tolerances.
+    start : tuple of tuple of float
+        Known designs, values of the variables in their order, which the first generation has; at most a population.
 
     Raises
     ------
@@ -173,9 +189,11 @@ class GoalPlan:
     seed: int = 1
     polish: bool = True
     drives: int = 0
+    start: tuple[tuple[float, ...], ...] = ()
 
     def __post_init__(self) -> None:
         _check_variables(self)
+        _check_start(self)
         for i, limit in enumerate(self.subject_to):
             _check(math.isfinite(limit.value), f"subject_to.{i}.{limit.kind}", limit.value, "a finite number")
             within = f"subject_to.{i}.within"
@@ -231,7 +249,7 @@ class GoalPlan:
         """
         try:
             return cls(
-                vary=tuple(_variable(one) for one in data["vary"]),
+                vary=tuple(Variable.from_json(one) for one in data["vary"]),
                 best=tuple(_goal(one) for one in data.get("best", ())),
                 subject_to=tuple(_limit(i, one) for i, one in enumerate(data.get("subject_to", ()))),
                 at=tuple(_point(one) for one in data.get("at") or [{}]),
@@ -241,6 +259,7 @@ class GoalPlan:
                 seed=int(data["seed"]),
                 polish=bool(data.get("polish", True)),
                 drives=int(data.get("drives", 0)),
+                start=tuple(tuple(float(value) for value in one) for one in data.get("start", ())),
             )
         except KeyError as error:
             raise ValueError(f"goal: {error.args[0]} is missing") from error
@@ -265,6 +284,7 @@ class GoalPlan:
             "seed": self.seed,
             "polish": self.polish,
             **({"drives": self.drives} if self.drives else {}),
+            **({"start": [list(one) for one in self.start]} if self.start else {}),
         }
 
 
@@ -319,13 +339,12 @@ def _check_variables(plan: GoalPlan) -> None:
             seen.add(path)
 
 
-def _variable(data: Mapping[str, Any]) -> Variable:
-    paths = tuple(str(path) for path in data["paths"])
-    if "values" in data:
-        values = tuple(sorted({float(value) for value in data["values"]}))
-        _check(bool(values), "vary.values", [], "at least one value")
-        return Variable(paths, values[0], values[-1], values)
-    return Variable(paths, float(data["low"]), float(data["high"]))
+def _check_start(plan: GoalPlan) -> None:
+    _check(len(plan.start) <= plan.population, "start", len(plan.start), f"at most {plan.population} designs")
+    for i, design in enumerate(plan.start):
+        _check(len(design) == len(plan.vary), f"start.{i}", list(design), "a value of each variable")
+        for one, value in zip(plan.vary, design, strict=True):
+            _check(one.has(value), f"start.{i}", value, f"a value that {one.paths[0]} may have")
 
 
 def _point(data: Mapping[str, Any]) -> dict[str, float]:

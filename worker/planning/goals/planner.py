@@ -168,7 +168,7 @@ class GoalPlanner:
                 self._propose(self._proposed[:0])
                 return
             if searching and len(self._known) != self._space.size:
-                self._propose(self._search.propose(self._generation, self._known))
+                self._propose(self._begun_with(self._search.propose(self._generation, self._known)))
             elif self._polish_begun().done:
                 self._propose(self._proposed[:0])
                 return
@@ -180,6 +180,12 @@ class GoalPlanner:
             if len(self._asked):
                 return
             self._settle()
+
+    def _begun_with(self, coordinates: Floats) -> Floats:
+        """A generation; the first one with the known designs in place of as many that were drawn."""
+        if self._generation or not len(self._space.start):
+            return coordinates
+        return np.concatenate([self._space.start, coordinates[len(self._space.start) :]])
 
     def _propose(self, coordinates: Floats) -> None:
         designs = self._space.designs(coordinates)

@@ -27,6 +27,8 @@ class Space:
         Number of values of each catalogue, 0 for a range.
     size : int, optional
         Number of designs; None where there is a range.
+    start : float64 array, shape (designs, dimensions)
+        Coordinates of the known designs of the plan.
     """
 
     def __init__(self, plan: GoalPlan) -> None:
@@ -37,6 +39,10 @@ class Space:
         self.dimensions = len(plan.vary)
         self.counts = np.array([len(one.values) for one in plan.vary], dtype=np.int64)
         self.size = math.prod(self.counts.tolist()) if self.counts.all() else None
+        known = np.array(plan.start, dtype=np.float64).reshape(-1, self.dimensions)
+        self.start = self._unit(known)
+        #: Rounded coordinates would not give the numbers of a known design back.
+        self._exact = dict(zip(keys(self.start), known, strict=True))
 
     def designs(self, coordinates: Floats) -> Floats:
         """Values of the variables, SI, shape (designs, dimensions), at coordinates of that shape in [0, 1]."""
@@ -44,6 +50,8 @@ class Space:
         values = np.minimum(np.maximum(values, self._low), self._high)
         for i in np.flatnonzero(self.counts).tolist():
             values[:, i] = np.array(self._vary[i].values)[self.places(coordinates, i)]
+        for i, key in enumerate(keys(coordinates) if self._exact else ()):
+            values[i] = self._exact.get(key, values[i])
         return values + 0.0  # not -0.0
 
     def places(self, coordinates: Floats, variable: int) -> NDArray[np.int64]:
@@ -75,17 +83,22 @@ class Space:
         designs = cases[:: len(self._at), : self.dimensions]
         if not np.array_equal(self.cases(designs), cases):
             raise ValueError("the cases do not have the operating points of this search")
-        coordinates = (designs - self._low) / np.where(self._high > self._low, self._high - self._low, 1.0)
-        for i in np.flatnonzero(self.counts).tolist():
-            values = np.array(self._vary[i].values)
-            place = np.minimum(np.searchsorted(values, designs[:, i]), len(values) - 1)
-            coordinates[:, i] = np.where(values[place] == designs[:, i], (place + 0.5) / len(values), np.nan)
+        coordinates = self._unit(designs)
         inside = (coordinates >= 0.0) & (coordinates <= 1.0)
         if not inside.all():
             i = int(np.flatnonzero(~inside.all(axis=0))[0])
             value = designs[~inside[:, i], i][0]
             raise ValueError(f"{self._vary[i].paths[0]}: {value} is not a value of this search")
         return designs, coordinates
+
+    def _unit(self, designs: Floats) -> Floats:
+        """Coordinates of designs; NaN for what is no value of a catalogue."""
+        coordinates = (designs - self._low) / np.where(self._high > self._low, self._high - self._low, 1.0)
+        for i in np.flatnonzero(self.counts).tolist():
+            values = np.array(self._vary[i].values)
+            place = np.minimum(np.searchsorted(values, designs[:, i]), len(values) - 1)
+            coordinates[:, i] = np.where(values[place] == designs[:, i], (place + 0.5) / len(values), np.nan)
+        return np.asarray(coordinates)
 
 
 def _cases_of_a_design(plan: GoalPlan) -> Floats:

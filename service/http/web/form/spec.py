@@ -111,6 +111,13 @@ def _limit_fields(item: Mapping[str, Any]) -> Values:
     return {"kind": kind, "value": text_of(item[kind]), **within}
 
 
+def _start_fields(item: Mapping[str, Any]) -> Values:
+    start = item.get("start", [])
+    if start not in ([], [{}]):
+        raise ValueError("the form has no fields for known designs other than its own")
+    return {"start": "on" if start else ""}
+
+
 def _until(form: Filled) -> dict[str, Any]:
     texts = [form.text(name) for name in ("duration", *_WINDOW.fields)]
     given = {"duration": plain(texts[0])} if texts[0] else {}
@@ -250,6 +257,10 @@ _TOWARD: Final = Cell(
     lambda item: {"toward": "max" if item.get("max", False) else "min"}, counts=False,
 )  # fmt: skip
 _LIMIT: Final = Cell((*(kind for kind, _label in LIMITS), "within"), (*["value"] * 3, "within"), _limit, _limit_fields)
+_START: Final = Cell(
+    ("start",), ("start",), lambda form: {"start": [{}]} if form.text("start") == "on" else {}, _start_fields,
+    counts=False,
+)  # fmt: skip
 _BETWEEN: Final = Cell(
     ("between",), ("between/0", "between/1"),
     lambda form: {"between": [form.text(f"between/{end}") for end in range(2)]},
@@ -305,7 +316,7 @@ _SAMPLE: Final = Record((*described(SAMPLE.described.values()), PARTS["ranges"])
 _TIMES: Final = [entry for entry in (*SETTLED_RUN.values(), *ANY_RUN.values()) if entry.name != "until"]
 _RUN: Final = Record((_UNTIL, _WINDOW, *described(_TIMES)), key="run", when=lambda values: form_of(values).with_run)
 _GOAL: Final = Record(
-    (PARTS["vary"], PARTS["best"], PARTS["subject_to"], _Points(), *described(GOAL.described.values())),
+    (PARTS["vary"], PARTS["best"], PARTS["subject_to"], _Points(), _START, *described(GOAL.described.values())),
     whole="", key="goal", when=is_search, new=GOAL_DEFAULTS,
 )  # fmt: skip
 _REFINE: Final = Record(

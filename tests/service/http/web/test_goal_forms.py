@@ -50,7 +50,7 @@ def searching(**changes: Any) -> dict[str, Any]:
 
 
 def test_a_search_is_cloned_with_all_that_it_asks_for() -> None:
-    for spec in (searching(), load_spec(preset_text("fastest_drive")[1], "toml")):
+    for spec in (searching(), searching(start=[{}]), load_spec(preset_text("fastest_drive")[1], "toml")):
         assert isinstance(spec, dict)
         again, faults = spec_of(values_of(json.loads(json.dumps(spec))))
         assert faults == {}
@@ -58,6 +58,8 @@ def test_a_search_is_cloned_with_all_that_it_asks_for() -> None:
         assert parse_spec(again).study.plan == parse_spec(spec).study.plan
     with pytest.raises(ValueError, match="form"):
         values_of(searching(more=1))
+    with pytest.raises(ValueError, match="no fields for known designs"):
+        values_of(searching(start=[{"excitation.frequency": "30 Hz"}]))
     with pytest.raises(ValueError, match="form"):
         values_of(searching(best=[{"result": "efficiency", "weight": 2}]))
 

@@ -11,6 +11,7 @@ from sprag_study.service.spec.machine.registry import part_of
 from sprag_study.service.spec.node import Node
 from sprag_study.service.spec.report import Report
 from sprag_study.worker import models
+from sprag_study.worker.planning.goals import GoalPlan
 from tests.service.spec_sample import SPEC, parsed
 
 GOAL: dict[str, Any] = {
@@ -69,6 +70,45 @@ def test_a_goal_is_read_in_si() -> None:
         "seed": 1,
         "polish": True,
     }
+
+
+ARM, SPRING = "pendulums.0.arm", "pendulums.0.spring_rate"
+
+
+def test_known_designs_have_the_values_of_the_base_unless_others_are_given() -> None:
+    plan, report = read({"start": [{}, {ARM: "25 mm", "excitation.amplitude_y": 0.0025}]})
+    assert not report.faults
+    assert plan is not None
+    assert plan["start"] == [[9000.0, 0.03, 0.002], [9000.0, 0.025, 0.0025]]
+    assert GoalPlan.from_json(plan).to_json()["start"] == plan["start"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "pointer", "code"),
+    [
+        ({"start": {}}, "/goal/start", "wrong-type"),
+        ({"start": ["base"]}, "/goal/start/0", "wrong-type"),
+        ({"start": [{"shaft.inertia": 1}]}, "/goal/start/0/shaft.inertia", "invalid-path"),
+        ({"start": [{}, {ARM: "26 mm"}]}, f"/goal/start/1/{ARM}", "out-of-range"),
+        ({"start": [{SPRING: "20 N/mm"}]}, f"/goal/start/0/{SPRING}", "out-of-range"),
+        ({"start": [{SPRING: "8 mm"}]}, f"/goal/start/0/{SPRING}", "wrong-unit"),
+        ({"start": [{SPRING: "8 N/mm"}, {SPRING: 9}]}, f"/goal/start/1/{SPRING}", "ambiguous-unit"),
+        ({"start": [{}] * 5, "population": 4}, "/goal/start", "too-many"),
+        (
+            {"start": [{"excitation.amplitude_x": 0.001, "excitation.amplitude_y": 0.002}]},
+            "/goal/start/0/excitation.amplitude_x",
+            "conflict",
+        ),
+        (
+            {"start": [{}], "vary": [{"path": "shaft.inertia", "from": 1, "to": 2}]},
+            "/goal/start/0",
+            "out-of-range",
+        ),
+    ],
+)
+def test_a_known_design_is_one_of_the_search(changes: dict[str, Any], pointer: str, code: str) -> None:
+    _plan, report = read(changes)
+    assert [(str(fault.where), fault.code) for fault in report.faults] == [(pointer, code)]
 
 
 @pytest.mark.parametrize(
