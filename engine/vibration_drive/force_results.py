@@ -1,4 +1,9 @@
-"""The results of the forces of a vibration drive: names, units, meaning (docs/theory.md, "Forces")."""
+"""The results of the forces of a vibration drive: names, units, meaning, and what they need beside the model
+(docs/theory.md, "Forces").
+"""
+
+import math
+from dataclasses import dataclass
 
 from sprag_study.engine.catalogue import ResultInfo
 
@@ -63,3 +68,25 @@ def force_infos(pendulums: int) -> tuple[ResultInfo, ...]:
     for index in range(pendulums):
         infos += _pendulum(index)
     return infos
+
+
+@dataclass(frozen=True, slots=True)
+class Bearing:
+    """What the bearings of the output shaft need beside the model.
+
+    Attributes
+    ----------
+    rating : float
+        Basic dynamic radial load rating C in N; NaN where it is not known.
+    exponent : float
+        Of the life: 3 for ball bearings, 10/3 for roller bearings.
+    share : float
+        Part of the load of all bearings that the bearing with the largest load carries.
+    shaft_mass : float
+        Mass in kg of the shaft and of what is fixed to it, centred on its axis.
+    """
+
+    rating: float = math.nan
+    exponent: float = 3.0
+    share: float = 1.0
+    shaft_mass: float = 0.0

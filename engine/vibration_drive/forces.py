@@ -18,7 +18,7 @@ from sprag_study.engine.outcome import Forces, Trajectory
 from sprag_study.engine.run import Run, SettledRun
 from sprag_study.engine.vibration_drive.cases import case_matrix, default_of, scalars, with_lengths
 from sprag_study.engine.vibration_drive.engagements import MAX_PERIODS, read_steps
-from sprag_study.engine.vibration_drive.force_results import force_infos
+from sprag_study.engine.vibration_drive.force_results import Bearing, force_infos
 from sprag_study.engine.vibration_drive.formulas import base_series, drive, free_acceleration
 from sprag_study.engine.vibration_drive.integration import integrate
 from sprag_study.engine.vibration_drive.kernel import Kernel, kernel_of
@@ -39,28 +39,6 @@ _NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 #: Places of a step at which extremes are looked for, and how often the best of them is looked at more closely: each
 #: time the interval is an eighth of the one before, and the error a 64th.
 _PLACES, _CLOSER = np.linspace(0.0, 1.0, 17), 6
-
-
-@dataclass(frozen=True, slots=True)
-class Bearing:
-    """What the bearings of the output shaft need beside the model.
-
-    Attributes
-    ----------
-    rating : float
-        Basic dynamic radial load rating C in N; NaN where it is not known.
-    exponent : float
-        Of the life: 3 for ball bearings, 10/3 for roller bearings.
-    share : float
-        Part of the load of all bearings that the bearing with the largest load carries.
-    shaft_mass : float
-        Mass in kg of the shaft and of what is fixed to it, centred on its axis.
-    """
-
-    rating: float = math.nan
-    exponent: float = 3.0
-    share: float = 1.0
-    shaft_mass: float = 0.0
 
 
 def forces(columns: Mapping[str, ArrayLike], run: Run, bearing: Bearing, points: int) -> Forces:

@@ -104,6 +104,69 @@ class EngagementsQuestion:
 
 
 @dataclass(frozen=True, slots=True)
+class ForcesQuestion:
+    """What is known of the shaft and of its bearings, and at how many times."""
+
+    shaft_mass: Annotated[
+        str | None,
+        Setting(
+            "mass of the shaft and of what is fixed to it, kg or with a unit; by default 0",
+            examples=("1.5 kg",),
+            metavar="MASS",
+            label=N_("Mass of the shaft"),
+        ),
+    ] = None
+    load_rating: Annotated[
+        str | None,
+        Setting(
+            "basic dynamic load rating C of the bearing, N or with a unit; without it there is no rating life",
+            examples=("12 kN",),
+            metavar="FORCE",
+            label=N_("Load rating of the bearing"),
+        ),
+    ] = None
+    bearing: Annotated[
+        str,
+        Setting(
+            "kind of the bearing, for the exponent of its life",
+            choices=("ball", "roller"),
+            metavar="KIND",
+            label=N_("Bearing"),
+            words=(N_("ball bearing"), N_("roller bearing")),
+        ),
+    ] = "ball"
+    share: Annotated[
+        str | None,
+        Setting(
+            "part of the load that the bearing with the largest load carries; by default 1",
+            examples=("0.5",),
+            metavar="SHARE",
+            label=N_("Its share of the load"),
+        ),
+    ] = None
+    points: Annotated[
+        int,
+        Setting(
+            "equally spaced times",
+            examples=(50,),
+            low=MIN_TRAJECTORY_POINTS,
+            high=MAX_TRAJECTORY_POINTS,
+            metavar="N",
+        ),
+    ] = 1000
+    table: Annotated[
+        str,
+        Setting(
+            "the table of a CSV file; JSON has both",
+            choices=("results", "forces"),
+            metavar="TABLE",
+            of_files=True,
+            words=(N_("results"), N_("forces over time")),
+        ),
+    ] = "results"
+
+
+@dataclass(frozen=True, slots=True)
 class StrobesQuestion:
     """Which table."""
 
@@ -288,6 +351,18 @@ ENGAGEMENTS: Final = ViewInfo(
     pictures=False,
     title=N_("When the clutches engage"),
 )
+FORCES: Final = ViewInfo(
+    "forces",
+    ForcesQuestion,
+    "Compute the forces of one case on the vibrating table and on the bearings of its shaft, and their rating life.",
+    title=N_("Forces on the table and on the bearings"),
+    note=N_(
+        "Force of the pendulums and of the shaft on the vibrating table, over one turn of the settled motion or over "
+        "the window. An exciter gives the opposite force, and what accelerates the table. The bearings of the shaft "
+        "carry the same load where the pendulums hang on the shaft and their springs act in pairs; belts and gears "
+        "are not in it."
+    ),
+)
 STROBES: Final = ViewInfo(
     "strobes",
     StrobesQuestion,
@@ -361,4 +436,4 @@ TRANSIENT: Final = ViewInfo(
     ),
 )
 #: Every view of a case, in the order of the API.
-CASE_VIEWS: Final = (TRAJECTORY, ENGAGEMENTS, STROBES, BRANCH, DIAGRAM, SECTION, BASIN, TRANSIENT)
+CASE_VIEWS: Final = (TRAJECTORY, ENGAGEMENTS, FORCES, STROBES, BRANCH, DIAGRAM, SECTION, BASIN, TRANSIENT)

@@ -8,6 +8,7 @@ from sprag_study.service.views.basin import BasinView
 from sprag_study.service.views.branch import BranchView
 from sprag_study.service.views.case_view import CaseView
 from sprag_study.service.views.engagements import EngagementsView
+from sprag_study.service.views.forces import ForcesView
 from sprag_study.service.views.portrait import StrobesView
 from sprag_study.service.views.sections import DiagramView, SectionView
 from sprag_study.service.views.trajectory import TrajectoryView
@@ -17,7 +18,7 @@ from sprag_study.service.views.transient import TransientView
 CASE_VIEWS: Final[dict[str, CaseView[Any, Any, Any]]] = {
     view.about.name: view
     for view in (
-        TrajectoryView(), EngagementsView(), StrobesView(), BranchView(), DiagramView(), SectionView(), BasinView(),
-        TransientView(),
+        TrajectoryView(), EngagementsView(), ForcesView(), StrobesView(), BranchView(), DiagramView(), SectionView(),
+        BasinView(), TransientView(),
     )
 }  # fmt: skip

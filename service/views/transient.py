@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from sprag_study.sentences import Amount, Sentence, Typed, Whole
+from sprag_study.sentences import Amount, Whole
 from sprag_study.service.answers import filled
 from sprag_study.service.answers.transients import Transient as TransientData
 from sprag_study.service.faults import FaultError, choice_of, parameter_error
 from sprag_study.service.figures.transient import transient_figure
 from sprag_study.service.languages import N_, _
 from sprag_study.service.reading.limits import span
-from sprag_study.service.reading.numbers import in_language
 from sprag_study.service.reading.reader import Phrase, joined, term
-from sprag_study.service.reading.units import QuantityError, typed_value
+from sprag_study.service.views.amounts import Range, amount_of
 from sprag_study.service.views.case_questions import TRANSIENT, TransientQuestion
 from sprag_study.service.views.case_view import CaseAnswer, CaseView, Said
 from sprag_study.service.views.setting import Offered
@@ -33,13 +32,11 @@ if TYPE_CHECKING:
     from sprag_study.worker.models.transients import Kind
     from sprag_study.worker.study import Study
 
-#: The parameters of a transient besides its kind: unit, smallest and largest value.
+#: The parameters of a transient besides its kind.
 _RANGES: Final = {
-    "load": ("1", 0.0, 1e6), "torque": ("N*m", 0.0, 1e12), "within": ("1", 0.0, 0.9),
-    "revolutions": ("1", 0.0, 1e5), "angle": ("rad", 0.0, math.inf),
+    "load": Range("1", 0.0, 1e6), "torque": Range("N*m", 0.0, 1e12, above=True), "within": Range("1", 0.0, 0.9),
+    "revolutions": Range("1", 0.0, 1e5, above=True), "angle": Range("rad", 0.0, math.inf),
 }  # fmt: skip
-#: Those that must be greater than their smallest value.
-_OPEN: Final = frozenset({"torque", "revolutions"})
 _DEVIATION: Final = 0.01
 
 
@@ -87,22 +84,13 @@ def course_of(study: Study, case: int, kind: str, given: Mapping[str, str | None
     )
 
 
-def _value(name: str, text: str | None, end: float, motor: bool) -> float:
-    unit, low, high = _RANGES[name]
-    high = end if name == "angle" else high
-    shown = Sentence("a number") if unit == "1" else Sentence("a value in {unit}", unit=Typed(unit))
-    try:
-        text = in_language(text or "")
-        value = typed_value(text, unit)
-    except QuantityError as error:
-        raise parameter_error(name, error.code, error.message, text, shown) from error
-    least = 1e-9 if name == "within" and motor else low
-    above = name in _OPEN
-    if not (least < value if above else least <= value) or not value <= high:
-        ends = {"low": Amount(least, digits=6), "high": Amount(high, unit, 6)}
-        allowed = Sentence("above {low} to {high}", **ends) if above else Sentence("{low} to {high}", **ends)
-        raise parameter_error(name, "out-of-range", "is outside its range", text, allowed)
-    return value
+def _value(name: str, text: str, end: float, motor: bool) -> float:
+    allowed = _RANGES[name]
+    if name == "angle":
+        allowed = allowed._replace(high=end)
+    if name == "within" and motor:
+        allowed = allowed._replace(low=1e-9)
+    return amount_of(name, text, allowed)
 
 
 def row_headings(study: Study) -> list[str]:

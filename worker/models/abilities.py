@@ -1,4 +1,4 @@
-"""What only some models can do, each an object of its model, or None: clutches, strobes, transients.
+"""What only some models can do, each an object of its model, or None: clutches, reactions, strobes, transients.
 
 Every function is a module's own, so that another process can run it.
 """
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from sprag_study.engine.outcome import Basin, Engagements, Portrait
     from sprag_study.worker.models.branches import Along, CaseBranch
     from sprag_study.worker.models.common import KernelShape
+    from sprag_study.worker.models.forces import Bearing, Forces
     from sprag_study.worker.models.model import Strobes, Transients
     from sprag_study.worker.models.sections import CaseSections, Sampling
     from sprag_study.worker.models.turns import CaseTurn
@@ -32,6 +33,11 @@ def has_clutches(study: Study) -> bool:
     return model_of(study.model).clutches is not None
 
 
+def has_reactions(study: Study) -> bool:
+    """Whether the machine of ``study`` acts on a vibrating table."""
+    return model_of(study.model).reactions is not None
+
+
 def has_strobes(study: Study) -> bool:
     """Whether the cases of ``study`` have a `run_portrait`."""
     return model_of(study.model).strobes is not None
@@ -45,6 +51,11 @@ def has_transients(study: Study) -> bool:
 def run_engagements(study: Study, case: int) -> Engagements:
     """Engagements of the clutches of one case; ValueError where its machine has none."""
     return _of(study, model_of(study.model).clutches, "clutches").engagements(study, case)
+
+
+def run_forces(study: Study, case: int, bearing: Bearing, points: int) -> Forces:
+    """Forces of one case, with ``points`` equally spaced times; ValueError where its machine has none."""
+    return _of(study, model_of(study.model).reactions, "forces on a table").forces(study, case, bearing, points)
 
 
 def run_portrait(study: Study, case: int) -> Portrait:

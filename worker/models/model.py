@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from sprag_study.engine.outcome import Basin, Engagements, Portrait, Trajectory
     from sprag_study.worker.models.branches import Along, CaseBranch
     from sprag_study.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
+    from sprag_study.worker.models.forces import Bearing, Forces
     from sprag_study.worker.models.sections import CaseSections, Sampling
     from sprag_study.worker.models.turns import CaseTurn
     from sprag_study.worker.study import Study
@@ -31,6 +32,14 @@ class Clutches(Protocol):
 
     def engagements(self, study: Study, case: int) -> Engagements:
         """Engagements of the clutches of one case."""
+        ...
+
+
+class Reactions(Protocol):
+    """The machines of a model vibrate with a table, on which they act."""
+
+    def forces(self, study: Study, case: int, bearing: Bearing, points: int) -> Forces:
+        """Forces of one case, with ``points`` equally spaced times."""
         ...
 
 
@@ -180,6 +189,11 @@ class Model(Protocol):
     @property
     def clutches(self) -> Clutches | None:
         """The clutches of its machines; None where they have none."""
+        return None
+
+    @property
+    def reactions(self) -> Reactions | None:
+        """The forces of its machines on a vibrating table; None where they have none."""
         return None
 
     @property

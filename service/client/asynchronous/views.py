@@ -17,6 +17,7 @@ from sprag_study.service.client.queries import query_of
 if TYPE_CHECKING:
     from sprag_study.service.answers.calibration import CalibrationReport
     from sprag_study.service.answers.explore import Exploration
+    from sprag_study.service.answers.forces import Forces
     from sprag_study.service.answers.goals import FrontReport
     from sprag_study.service.answers.key import AnswerReport
     from sprag_study.service.answers.results import BasinData, Branch, Map, Portrait, SensitivityReport
@@ -274,6 +275,45 @@ class AsyncStudyViews(AsyncStudyPart):
         """Compute every engagement of the clutches of one case, and the means of its periods."""
         query = query_of({"start": start})
         return Engagements(cast("Any", await self._of_case(case, "/engagements", query)))
+
+    async def forces(
+        self,
+        case: int,
+        *,
+        shaft_mass: str | None = None,
+        load_rating: str | None = None,
+        bearing: str | None = None,
+        share: Value | None = None,
+        points: int | None = None,
+        start: int | None = None,
+    ) -> Forces:
+        """Compute the forces of one case on the vibrating table and on the bearings of its shaft, and their rating
+        life.
+
+        Parameters
+        ----------
+        shaft_mass : str, optional
+            Mass of the shaft and of what is fixed to it, kg or with a unit; by default 0.
+        load_rating : str, optional
+            Basic dynamic load rating C of the bearing, N or with a unit; without it there is no rating life.
+        bearing : str, optional
+            Kind of the bearing, for the exponent of its life.
+        share : float or str, optional
+            Part of the load that the bearing with the largest load carries; by default 1.
+        points : int, optional
+            Equally spaced times.
+        """
+        query = query_of(
+            {
+                "shaft_mass": shaft_mass,
+                "load_rating": load_rating,
+                "bearing": bearing,
+                "share": share,
+                "points": points,
+                "start": start,
+            }
+        )
+        return cast("Forces", await self._of_case(case, "/forces", query))
 
     async def strobes(self, case: int, *, start: int | None = None) -> Portrait:
         """Compute the state of one case at the end of each excitation period, and its orbit."""

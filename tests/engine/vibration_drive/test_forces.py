@@ -11,8 +11,8 @@ import pytest
 from sprag_study.engine.endings import Ending
 from sprag_study.engine.outcome import Forces
 from sprag_study.engine.run import SettledRun
-from sprag_study.engine.vibration_drive.force_results import force_infos
-from sprag_study.engine.vibration_drive.forces import Bearing, forces, settled_forces
+from sprag_study.engine.vibration_drive.force_results import Bearing, force_infos
+from sprag_study.engine.vibration_drive.forces import forces, settled_forces
 from sprag_study.engine.vibration_drive.regimes import settled_infos
 from sprag_study.engine.vibration_drive.settle import settle
 from tests.engine.vibration_drive.drive import Columns, clutch, drive, pendulum, periods

@@ -38,6 +38,7 @@ NEVER_SERVED = {
             "calibration",
             "front",
             "cases/{case}/engagements",
+            "cases/{case}/forces",
             "cases/{case}/strobes",
             "cases/{case}/branch",
             "cases/{case}/transient",

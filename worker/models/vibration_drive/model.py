@@ -59,7 +59,8 @@ if TYPE_CHECKING:
     from sprag_study.engine.outcome import Basin, Engagements, Portrait, Trajectory
     from sprag_study.engine.run import Reset, Unit
     from sprag_study.worker.models.branches import Along, CaseBranch
-    from sprag_study.worker.models.model import Clutches, Strobes
+    from sprag_study.worker.models.forces import Bearing, Forces
+    from sprag_study.worker.models.model import Clutches, Reactions, Strobes
     from sprag_study.worker.models.sections import CaseSections, Sampling
     from sprag_study.worker.models.turns import CaseTurn
     from sprag_study.worker.study import Study
@@ -307,6 +308,10 @@ class VibrationDrive(Model):
         return _Clutches()
 
     @property
+    def reactions(self) -> Reactions:
+        return _Reactions()
+
+    @property
     def strobes(self) -> Strobes:
         return _Strobes()
 
@@ -354,6 +359,17 @@ class _Clutches:
         if is_settled(study.run):
             return settled_engagements(columns, settings_of(study.run), start_of(study, case))
         return engagements(columns, run_of(study.run))
+
+
+class _Reactions:
+    def forces(self, study: Study, case: int, bearing: Bearing, points: int) -> Forces:
+        """Those of one turn of the settled motion for a settled study, otherwise those in the window."""
+        from sprag_study.engine.vibration_drive.forces import forces, settled_forces
+
+        columns = case_machine(study, case)
+        if is_settled(study.run):
+            return settled_forces(columns, settings_of(study.run), bearing, points, start_of(study, case))
+        return forces(columns, run_of(study.run), bearing, points)
 
 
 class _Strobes:

@@ -137,7 +137,10 @@ PAGES: Final[dict[str, list[str]]] = {
     ],
     "/studies/{study_id}/cases/{case}": [
         "/studies/{STUDY}/cases/0", "/studies/{SHAFT}/cases/0", "/studies/{SHAFT}/cases/0?show=transient",
-        *(f"/studies/{{STUDY}}/cases/0?show={part}" for part in ("engagements", "strobes", "section", "branch")),
+        *(
+            f"/studies/{{STUDY}}/cases/0?show={part}"
+            for part in ("engagements", "forces", "strobes", "section", "branch")
+        ),
     ],
     "/studies/{study_id}/cases/{case}/laboratory": ["/studies/{STUDY}/cases/0/laboratory"],
 }  # fmt: skip
