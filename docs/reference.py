@@ -18,6 +18,7 @@ from fastapi.routing import APIRoute
 from docs import manual
 from sprag_study.engine.formulas.expressions import MAX_LENGTH
 from sprag_study.engine.vibration_drive.engagements import MAX_PERIODS
+from sprag_study.engine.vibration_drive.force_results import force_infos
 from sprag_study.service.cli.app import command_line
 from sprag_study.service.cli.console import ExitCode
 from sprag_study.service.cli.settings import VARIABLES
@@ -83,6 +84,12 @@ def results(model: str, besides: Container[str] | None = None) -> Iterator[Row]:
             yield f"`{info.name}`", info.unit, info.description
 
 
+def forces() -> Iterator[Row]:
+    """Every result of the forces of a case."""
+    for info in force_infos(1):
+        yield f"`{info.name.replace('pendulums.0.', 'pendulums.N.')}`", info.unit, info.description
+
+
 def meanings(sentences: dict[str, str]) -> Iterator[Row]:
     """Names with their sentences."""
     return ((f"`{name}`", sentence) for name, sentence in sentences.items())
@@ -116,7 +123,7 @@ def limits() -> Iterator[Row]:
     yield "tolerance", f"{limit.MIN_TOLERANCE:g} to {limit.MAX_TOLERANCE:g}"
     yield "cases of a study of a selection (`select`)", f"{limit.MAX_POINTS_SELECTED:,}"
     yield "times of a trajectory", f"{limit.MAX_TRAJECTORY_POINTS:,}"
-    told = "excitation periods in the tables of a case's engagements: the last of its run"
+    told = "excitation periods in the tables of a case's engagements, and of which it has forces: the last of its run"
     yield told, f"{MAX_PERIODS}"
     yield "studies that have not ended", f"{limit.MAX_WAITING_STUDIES:,}"
     yield "schedules", f"{limit.MAX_SCHEDULES:,}"
@@ -174,6 +181,7 @@ TABLES: dict[str, tuple[str, Iterable[Row]]] = {
     **{f"results of the {WORDS[name]}": ("result | unit | ", results(name)) for name in models.model_names()},
     "results of settled cases": ("result | unit | meaning ", results(DRIVE, SETTLED_ONLY)),
     "results of cases with starts": ("result | unit | meaning ", results(DRIVE, STARTS_ONLY)),
+    "forces of a case": ("result | unit | meaning ", forces()),
     "regimes": ("regime | meaning ", meanings(models.REGIME_SENTENCES)),
     "endings": ("ending | ", meanings(dict(models.ENDING_SENTENCES))),
     "flags": ("flag | ", meanings({k: v for name in models.model_names() for k, v in models.flags_of(name).items()})),
