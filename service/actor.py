@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -28,6 +28,10 @@ class Door(StrEnum):
     PROGRAM = "program"
     SCHEDULE = "schedule"
     SERVICE = "service"
+
+
+#: The ways in through a running service, which reads users and tokens anew every two seconds only.
+SERVED: Final = frozenset({Door.API, Door.PAGE})
 
 
 class Role(StrEnum):

@@ -145,6 +145,8 @@ Kind = Literal[
     "unauthorized",
     "unavailable",
     "unsupported-media-type",
+    "user-exists",
+    "user-not-found",
     "view-not-found",
     "wrong-host",
     "wrong-state",

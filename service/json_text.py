@@ -8,6 +8,8 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -16,6 +18,14 @@ def to_bytes(data: Any) -> bytes:
     """``data`` as JSON text in UTF-8. NaN and infinities raise ValueError; a lone surrogate stays escaped."""
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.encode("utf-8", errors="backslashreplace")
+
+
+def list_document(name: str, items: Iterable[bytes]) -> Iterator[bytes]:
+    """A JSON object whose only field is a list of the ``items``, which are JSON texts, in pieces: one in each line."""
+    yield b'{"%s": [' % name.encode("ascii")
+    for number, item in enumerate(items):
+        yield (b",\n" if number else b"\n") + item
+    yield b"\n]}\n"
 
 
 def timestamp(moment: datetime) -> str:

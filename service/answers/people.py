@@ -36,6 +36,9 @@ class User(TypedDict):
     role: Annotated[str, Doc("viewer, designer or administrator")]
     created_at: Moment
     removed_at: Annotated[Moment | None, Doc("since then the user may not use the service")]
+    most_cases: Annotated[int | None, Doc("the user's own limit; 0: no limit; null: as the settings have it")]
+    most_bytes: Annotated[int | None, Doc("the user's own limit, as most_cases")]
+    most_checks: Annotated[int | None, Doc("the user's own limit, as most_cases")]
     quota: QuotaUse
 
 
@@ -43,6 +46,13 @@ class UserList(TypedDict):
     """All users, by name."""
 
     users: list[User]
+
+
+class HandedOver(TypedDict):
+    """What belongs to another user now."""
+
+    studies: int
+    schedules: int
 
 
 class AuditEntry(TypedDict):

@@ -1,10 +1,10 @@
-"""``sprag admin``: users, tokens, the database, workers, and what is wrong with an installation."""
+"""``sprag admin``: users, tokens, the audit log, the database, workers, and what is wrong with an installation."""
 
 from __future__ import annotations
 
 import typer
 
-from sprag_study.service.cli import database, doctor, processes, token, user, workers
+from sprag_study.service.cli import audit, database, doctor, processes, token, user, workers
 from sprag_study.service.cli.described import listing
 from sprag_study.service.cli.groups import Groups
 from sprag_study.service.cli.options import Database
@@ -14,6 +14,7 @@ app = typer.Typer(
 )
 app.callback()(listing(db=Database))
 app.command("doctor")(doctor.doctor)
+app.command("audit")(audit.audit)
 app.command("worker")(processes.worker)
 app.command("workers")(workers.workers)
 app.add_typer(database.app, name="db")

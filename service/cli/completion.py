@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Final, TypeVar
 
 import typer
@@ -67,7 +68,18 @@ def tokens(context: typer.Context, incomplete: str) -> list[tuple[str, str]]:
 
 
 def users(context: typer.Context) -> list[tuple[str, str]]:
-    """Names of the users, each with the role; a removed one too, who can be restored."""
+    """Names of the users of the service or of the database; each with the role, a removed one too."""
+    from sprag_study.service.cli.stores import asks_service
+
+    with _typed(context):
+        asks = asks_service(context.params.get("db"))
+    if not asks:
+        return stored_users(context)
+    return _asked(context, lambda client: [(user["name"], user["role"]) for user in client.users()])
+
+
+def stored_users(context: typer.Context) -> list[tuple[str, str]]:
+    """Names of the users of the database, as `users` gives them."""
     return [(user.name, user.role.value) for user in _stored(context, lambda store: store.people.users())]
 
 
@@ -144,18 +156,28 @@ def _of_study(context: typer.Context, parts: Sequence[str]) -> list[tuple[str, s
 
 def _asked(context: typer.Context, ask: Callable[[Client], list[Offered]]) -> list[Offered]:
     """What the service of the command answers; nothing where none answers."""
-    from sprag_study.service.cli.common import CURRENT, Common, access
+    from sprag_study.service.cli.common import access
     from sprag_study.service.cli.console import CommandFailureError
     from sprag_study.service.client import Client, RefusedError, UnreachableError
+
+    try:
+        with _typed(context):
+            service = access()
+            with Client(service.server, service.token, retry=0.0, timeout=_TIMEOUT) as client:
+                return ask(client)
+    except (CommandFailureError, RefusedError, UnreachableError, ValueError):  # ValueError: the address of the service
+        return []
+
+
+@contextmanager
+def _typed(context: typer.Context) -> Iterator[None]:
+    """With the options of every command as they are typed."""
+    from sprag_study.service.cli.common import CURRENT, Common
 
     typed = context.find_root().params
     before = CURRENT.set(Common(typed.get("server"), typed.get("token")))
     try:
-        service = access()
-        with Client(service.server, service.token, retry=0.0, timeout=_TIMEOUT) as client:
-            return ask(client)
-    except (CommandFailureError, RefusedError, UnreachableError, ValueError):  # ValueError: the address of the service
-        return []
+        yield
     finally:
         CURRENT.reset(before)
 

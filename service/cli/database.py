@@ -4,33 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, replace
-from enum import StrEnum
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sprag_study.service.cli.audit import Action, Actor, FormOption, Since, Target, Until, write_stored
 from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.configured import read_settings
 from sprag_study.service.cli.console import ExitCode, TroubleError, WrongInputError, say, write_json
-from sprag_study.service.cli.files import write_pieces
 from sprag_study.service.cli.groups import Groups
 from sprag_study.service.cli.options import Database, OutputFile
 from sprag_study.service.cli.stores import database_of, named_store
-from sprag_study.service.faults import FaultError
 from sprag_study.service.languages import _
 
 if TYPE_CHECKING:
-    from sprag_study.service.exports.audit import AuditFormat
     from sprag_study.service.storage.database.session import Session
-
-
-class AuditForm(StrEnum):
-    """Formats of the audit log."""
-
-    CSV = "csv"
-    JSONL = "jsonl"
 
 
 app = typer.Typer(
@@ -173,42 +163,17 @@ def move(
 
 @app.command()
 def audit(
-    since: Annotated[
-        str | None, typer.Option("--since", metavar="TIME", help="From this date or time on, such as 2027-01-31.")
-    ] = None,
-    until: Annotated[
-        str | None, typer.Option("--until", metavar="TIME", help="Up to this time; of a date the whole day.")
-    ] = None,
-    actor: Annotated[
-        str | None, typer.Option("--actor", metavar="NAME", help="Only changes by this user, token or schedule.")
-    ] = None,
-    action: Annotated[
-        str | None, typer.Option("--action", metavar="ACTION", help="Only this action, such as study.delete.")
-    ] = None,
-    target: Annotated[
-        str | None, typer.Option("--target", metavar="ID", help="Only changes of this study, schedule, token or user.")
-    ] = None,
-    form: Annotated[
-        AuditForm | None,
-        typer.Option(
-            "--format", help="A CSV row or a JSON object for each change; default: csv, with --json a document."
-        ),
-    ] = None,
+    since: Since = None,
+    until: Until = None,
+    actor: Actor = None,
+    action: Action = None,
+    target: Target = None,
+    form: FormOption = None,
     output: OutputFile = None,
     db: Database = None,
 ) -> None:
-    """Write the audit log: who changed what, when and from where; earliest first."""
-    from sprag_study.service.exports.audit import audit_pieces
-    from sprag_study.service.storage.people.audit import audit_filter
-
-    try:
-        wanted = audit_filter(since, until, actor, action, target)
-    except FaultError as error:
-        named = [replace(fault, where=f"--{fault.where}") for fault in error.faults]
-        raise WrongInputError("invalid-parameter", _("invalid option"), named) from error
-    with named_store(db) as store:
-        usual: AuditFormat = "json" if wants_json() else "csv"
-        write_pieces(output, audit_pieces(store.audit.rows(wanted), form.value if form else usual))
+    """Write the audit log of the database, as `sprag admin audit` does."""
+    write_stored((since, until, actor, action, target), form, output, db)
 
 
 def _tell_damaged(problems: Sequence[str]) -> None:

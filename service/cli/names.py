@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -41,12 +41,12 @@ def token_of(people: People, text: str) -> str:
         return meant(text, tokens, "tokens", "tk_")
 
 
-def user_of(people: People, text: str, where: str = "NAME") -> str:
-    """The name of the user who is meant by ``where`` of a command; errors as of `study_of`."""
+def user_of(names: Iterable[str], text: str, where: str = "NAME") -> str:
+    """The one of the ``names`` of users that is meant by ``where`` of a command; errors as of `study_of`."""
     from sprag_study.service.client.matching import Named, meant
 
     with _one(where, text, _("the name of a user"), _("the user is not unique")):
-        return meant(text, [Named(user.name, user.name, user.name) for user in people.users()], "users")
+        return meant(text, [Named(name, name, name) for name in names], "users")
 
 
 @contextmanager

@@ -1,14 +1,17 @@
-"""The database of a command: only those that start or run something create one, and every answer names it."""
+"""The database of a command, or the service that has it: only those that start or run something create a database, and
+every answer names it."""
 
 from __future__ import annotations
 
+import os
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from sprag_study.service.cli.common import wants_json
+from sprag_study.service.cli.common import CURRENT, wants_json
 from sprag_study.service.cli.configured import read_settings
 from sprag_study.service.cli.console import WrongInputError, say
 from sprag_study.service.languages import _
+from sprag_study.service.login import profile
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -32,6 +35,28 @@ def database_of(db: str | None) -> str:
         )
         raise WrongInputError("invalid-file", missing)
     return url
+
+
+def asks_service(db: str | None) -> bool:
+    """Whether a command of administrators asks the service, and not a database.
+
+    It does with ``--server``, and on a machine without a database where ``SPRAG_SERVER`` or a login names a service;
+    never with ``db`` (the option).
+    """
+    if db is not None or CURRENT.get().server:
+        return db is None
+    return bool(os.environ.get("SPRAG_SERVER") or "server" in profile()) and not _is_here()
+
+
+def _is_here() -> bool:
+    """Whether there is a database of the settings."""
+    try:
+        from sprag_study.service.storage.database.session import file_of
+
+        file = file_of(read_settings().database_url)
+    except ModuleNotFoundError:  # only the client is installed
+        return False
+    return file is None or file.exists()
 
 
 def store_of(db: str | None) -> Store:

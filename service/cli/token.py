@@ -62,7 +62,7 @@ def create(
             "--user",
             metavar="NAME",
             help="User to whom the token belongs; default: none.",
-            autocompletion=completion.users,
+            autocompletion=completion.stored_users,
         ),
     ] = None,
     expires: Annotated[
@@ -76,7 +76,7 @@ def create(
     """Create a token and print it; only its digest is stored, so it cannot be shown again."""
     with users_of(db) as store:
         ends = None if expires is None else store.clock.now() + timedelta(days=expires)
-        owner = None if user is None else user_of(store.people, user, "--user")
+        owner = None if user is None else user_of([known.name for known in store.people.users()], user, "--user")
         store.people.most_tokens = read_settings().user_tokens
         secret, record = store.people.create_token(token_name(name, "--name"), scope, owner=owner, expires_at=ends)
     if wants_json():

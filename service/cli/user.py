@@ -1,30 +1,38 @@
-"""``sprag admin user``: add, list, change and remove users of the database."""
+"""``sprag admin user``: add, list, change and remove users, of a service or of a database."""
 
 from __future__ import annotations
 
 from contextlib import contextmanager
 from dataclasses import replace
 from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final, Protocol
 
 import typer
 
 from sprag_study.service.actor import Role
 from sprag_study.service.cli import completion
 from sprag_study.service.cli.common import wants_json
-from sprag_study.service.cli.console import WrongInputError, say, show_table, time_text, write_json
+from sprag_study.service.cli.console import (
+    CommandFailureError,
+    WrongInputError,
+    say,
+    show_table,
+    time_text,
+    write_json,
+)
 from sprag_study.service.cli.groups import Groups
 from sprag_study.service.cli.names import user_of
 from sprag_study.service.cli.options import Database
-from sprag_study.service.cli.stores import named_store
+from sprag_study.service.cli.remote import connection
+from sprag_study.service.cli.stores import asks_service, named_store
 from sprag_study.service.faults import FaultError
 from sprag_study.service.languages import _
-from sprag_study.service.storage.people.scopes import user_name
+from sprag_study.service.storage.people.scopes import require_one_limit, user_name
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
 
-    from sprag_study.service.storage.people.people import Quota, UserRecord
+    from sprag_study.service.answers.people import HandedOver, User
     from sprag_study.service.storage.store import Store
 
 app = typer.Typer(
@@ -92,16 +100,19 @@ def add(
     db: Database = None,
 ) -> None:
     """Add a user, who logs in with a token (`sprag admin token create --user`) or through a trusted proxy."""
-    with users_of(db) as store:
-        record = store.people.add_user(user_name(name, "NAME"), role or Role.DESIGNER, _quota(cases, storage, checks))
+    with users_at(db) as (users, where):
+        user = users.add_user(user_name(name, "NAME"), role or Role.DESIGNER, **_limits(cases, storage, checks))
+    said = {"name": user["name"], "role": user["role"]}
+    if "server" in where:
+        _show(where, user, _("{name} is a user: {role}; the page Users and tokens creates tokens", **said))
+        return
     _show(
-        store,
-        record,
+        where,
+        user,
         _(
             "{name} is a user: {role}; every request to a service of this database now needs a token, which `sprag "
             "admin token create --user {name} --name PURPOSE` prints",
-            name=record.name,
-            role=record.role,
+            **said,
         ),
     )
 
@@ -109,22 +120,19 @@ def add(
 @app.command("list")
 def list_users(db: Database = None) -> None:
     """List all users with their roles, their quotas and the use of the quotas."""
-    with users_of(db) as store:
-        found = [(record, store.people.usage(record.name)) for record in store.people.users()]
-        where = {"database": store.session.location}
+    with users_at(db) as (users, where):
+        listed = users.users()
     if wants_json():
-        write_json({**where, "users": [{**_json(u), "cases": used.cases, "bytes": used.bytes} for u, used in found]})
+        write_json({**where, "users": [{**_json(user), **_used(user)} for user in listed]})
         return
     limit = _("limit")
     waiting, size, checks = _("cases waiting"), _("bytes"), _("checks")
     headings = (_("name"), _("role"), waiting, limit, size, limit, checks, _("removed"))
-    rows = [
-        (
-            *(u.name, u.role, used.cases, u.quota.cases, used.bytes, u.quota.bytes, u.quota.checks),
-            time_text(_json(u)["removed_at"]),
-        )
-        for u, used in found
-    ]
+    rows = []
+    for user in listed:
+        used = _used(user)
+        limits = used["cases"], user["most_cases"], used["bytes"], user["most_bytes"], user["most_checks"]
+        rows.append((user["name"], user["role"], *limits, time_text(_json(user)["removed_at"])))
     show_table("", [(head, 2 <= place <= 6, place == 0) for place, head in enumerate(headings)], rows)
 
 
@@ -143,35 +151,36 @@ def change(
         raise WrongInputError(
             "invalid-parameter", _("nothing to change; `sprag admin user change --help` lists the options")
         )
-    with users_of(db) as store:
-        quota, known = _quota(cases, storage, checks), user_of(store.people, name)
-        again = ["bytes" if limit is Limit.STORAGE else limit.value for limit in as_set or ()]
-        record = store.people.change_user(known, role, quota, as_set=again)
-    _show(store, record, _("{name} is changed: {role}", name=record.name, role=record.role))
+    with users_at(db) as (users, where):
+        limits = _limits(cases, storage, checks, as_set or ())
+        fields = {} if role is None else {"role": str(role)}
+        user = users.change_user(user_of(_names(users), name), **fields, **limits)
+    _show(where, user, _("{name} is changed: {role}", name=user["name"], role=user["role"]))
 
 
 @app.command()
 def remove(name: Known, db: Database = None) -> None:
     """Remove a user, whose tokens and sessions end within two seconds; studies and schedules are kept."""
-    with users_of(db) as store:
-        record = store.people.change_user(user_of(store.people, name), removed=True)
+    with users_at(db) as (users, where):
+        user = users.change_user(user_of(_names(users), name), removed=True)
     _show(
-        store,
-        record,
-        _("{name} is removed; `sprag admin user hand-over` gives what they owned to another user", name=record.name),
+        where,
+        user,
+        _("{name} is removed; `sprag admin user hand-over` gives what they owned to another user", name=user["name"]),
     )
 
 
 @app.command()
 def restore(name: Known, db: Database = None) -> None:
     """Let a removed user in again, with the same tokens."""
-    with users_of(db) as store:
-        known = user_of(store.people, name)
-        removed = any(user.name == known and user.removed_at is not None for user in store.people.users())
-        record = store.people.change_user(known, removed=False)
-    values = {"name": record.name, "role": record.role}
+    with users_at(db) as (users, where):
+        before = {user["name"]: user for user in users.users()}
+        known = user_of(before, name)
+        removed = known in before and before[known]["removed_at"] is not None
+        user = users.change_user(known, removed=False)
+    values = {"name": user["name"], "role": user["role"]}
     again = _("{name} is a user again: {role}", **values)
-    _show(store, record, again if removed else _("{name} is not removed, so nothing has changed: {role}", **values))
+    _show(where, user, again if removed else _("{name} is not removed, so nothing has changed: {role}", **values))
 
 
 @app.command("hand-over")
@@ -189,14 +198,45 @@ def hand_over(
     db: Database = None,
 ) -> None:
     """Give the studies and schedules of one user to another."""
-    with users_of(db) as store:
-        name, to = user_of(store.people, name), user_of(store.people, to, "--to")
-        studies, schedules = store.people.hand_over(name, to)
+    with users_at(db) as (users, where):
+        names = _names(users)
+        name, to = user_of(names, name), user_of(names, to, "--to")
+        counts = users.hand_over_user(name, to)
     if wants_json():
-        write_json({"database": store.session.location, "studies": studies, "schedules": schedules})
+        write_json({**where, **counts})
     else:
-        counts = {"studies": studies, "schedules": schedules}
         say(_("{studies} studies and {schedules} schedules of {name} belong to {to} now", name=name, to=to, **counts))
+
+
+class Users(Protocol):
+    """The users of a service, or of a database."""
+
+    def users(self) -> list[User]:
+        """Every user, by name."""
+
+    def add_user(self, name: str, role: str = ..., **limits: int | None) -> User:
+        """Add a user."""
+
+    def change_user(self, name: str, **fields: Any) -> User:
+        """Change the given fields of a user."""
+
+    def hand_over_user(self, name: str, to: str) -> HandedOver:
+        """Give what belongs to a user to another."""
+
+
+@contextmanager
+def users_at(db: str | None) -> Iterator[tuple[Users, dict[str, str]]]:
+    """The users of the service or of the database, and which it is; errors as of `users_of`, and of a service."""
+    if asks_service(db):
+        with _naming_options(), connection() as client:
+            if not wants_json():
+                say(_("service {address}:", address=client.server))
+            yield client, {"server": client.server}
+        return
+    from sprag_study.service.jobs.users import StoredUsers
+
+    with users_of(db) as store:
+        yield StoredUsers(store.people), {"database": store.session.location}
 
 
 @contextmanager
@@ -204,42 +244,52 @@ def users_of(db: str | None) -> Iterator[Store]:
     """The store of a database; an unknown user, one who exists already, and a wrong name are wrong input."""
     from sprag_study.service.storage.errors import UserExistsError, UserNotFoundError
 
-    with named_store(db) as store:
+    with _naming_options(), named_store(db) as store:
         try:
             yield store
-        except WrongInputError:
-            raise
         except UserNotFoundError as error:
             raise WrongInputError("user-not-found", str(error)) from error
         except UserExistsError as error:
             raise WrongInputError("user-exists", str(error)) from error
-        except FaultError as error:
-            named = [replace(it, where=f"--{it.where}") if it.where in _OPTIONS else it for it in error.faults]
-            raise WrongInputError("invalid-parameter", error.detail, named) from error
 
 
-def _quota(cases: int | None, storage: int | None, checks: int | None) -> Quota:
-    from sprag_study.service.storage.people.people import Quota
+@contextmanager
+def _naming_options() -> Iterator[None]:
+    """What is wrong with a parameter is wrong input, and said of its option."""
+    try:
+        yield
+    except CommandFailureError:
+        raise
+    except FaultError as error:
+        named = [replace(it, where=f"--{it.where}") if it.where in _OPTIONS else it for it in error.faults]
+        raise WrongInputError("invalid-parameter", error.detail, named) from error
 
-    return Quota(cases, None if storage is None else storage * 2**20, checks)
+
+def _limits(
+    cases: int | None, storage: int | None, checks: int | None, as_set: Collection[Limit] = ()
+) -> dict[str, int | None]:
+    """The limits that are given, by the names of their fields; None for one that is again as set for all users."""
+    numbers = {"cases": cases, "bytes": None if storage is None else storage * 2**20, "checks": checks}
+    given: dict[str, int | None] = {name: number for name, number in numbers.items() if number is not None}
+    again = ["bytes" if limit is Limit.STORAGE else limit.value for limit in as_set]
+    require_one_limit(given, again)
+    return {f"most_{name}": number for name, number in {**given, **dict.fromkeys(again)}.items()}
 
 
-def _show(store: Store, record: UserRecord, sentence: str) -> None:
+def _names(users: Users) -> list[str]:
+    return [user["name"] for user in users.users()]
+
+
+def _show(where: dict[str, str], user: User, sentence: str) -> None:
     if wants_json():
-        write_json({"database": store.session.location, **_json(record)})
+        write_json({**where, **_json(user)})
     else:
         say(sentence)
 
 
-def _json(record: UserRecord) -> dict[str, Any]:
-    from sprag_study.service.json_text import timestamp
+def _used(user: User) -> dict[str, int]:
+    return {"cases": user["quota"]["cases"], "bytes": user["quota"]["bytes"]}
 
-    return {
-        "name": record.name,
-        "role": record.role.value,
-        "created_at": timestamp(record.created_at),
-        "removed_at": None if record.removed_at is None else timestamp(record.removed_at),
-        "most_cases": record.quota.cases,
-        "most_bytes": record.quota.bytes,
-        "most_checks": record.quota.checks,
-    }
+
+def _json(user: User) -> dict[str, Any]:
+    return {name: value for name, value in user.items() if name != "quota"}

@@ -196,6 +196,11 @@ def view_path(view_id: str) -> str:
     return f"/views/{_quoted('view_id', view_id)}"
 
 
+def user_path(name: str) -> str:
+    """Address of a user under the API."""
+    return f"/users/{_quoted('name', name)}"
+
+
 def schedule_path(schedule_id: str) -> str:
     """Address of a schedule under the API."""
     return f"/schedules/{_quoted('schedule_id', schedule_id)}"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 from sprag_study.service.answers import filled
 from sprag_study.service.answers.people import AuditEntry
 from sprag_study.service.exports.text import typed_lines
-from sprag_study.service.json_text import to_bytes
+from sprag_study.service.json_text import list_document, to_bytes
 from sprag_study.service.spec.csv_text import escape
 
 if TYPE_CHECKING:
@@ -35,10 +35,7 @@ def audit_pieces(records: Iterable[AuditRecord], form: AuditFormat) -> Iterator[
     """The rows as CSV, with a header, as one JSON object per line, or as one document with all of them."""
     rest = map(entry_json, records)
     if form == "json":
-        yield b'{"entries": ['
-        for number, entry in enumerate(rest):
-            yield (b",\n" if number else b"\n") + to_bytes(entry)
-        yield b"\n]}\n"
+        yield from list_document("entries", map(to_bytes, rest))
         return
     if form == "csv":
         yield typed_lines([list(AuditEntry.__annotations__)])

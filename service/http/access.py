@@ -17,7 +17,7 @@ import time
 from base64 import urlsafe_b64decode, urlsafe_b64encode
 from collections.abc import Mapping
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, cast
 from urllib.parse import urlsplit
 
 from sprag_study.sentences import Sentence
@@ -35,6 +35,7 @@ from sprag_study.service.storage.people.scopes import MAX_USER_NAME, TokenScope,
 
 if TYPE_CHECKING:
     from starlette.datastructures import Headers
+    from starlette.requests import Request
     from starlette.types import Scope
 
     from sprag_study.service.settings import Settings
@@ -291,3 +292,8 @@ def token_in(header: str) -> bytes | None:
 
 def _read(people: People) -> tuple[tuple[TokenRecord, ...], tuple[UserRecord, ...], SessionSecrets]:
     return people.tokens(), people.users(), people.session_secrets()
+
+
+def access_of(request: Request) -> Access:
+    """The `Access` of the service that answers."""
+    return cast("Access", request.app.state.access)

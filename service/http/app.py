@@ -82,6 +82,7 @@ from sprag_study.service.http.web.form import page as form
 from sprag_study.service.http.web.rows import pages as rows
 from sprag_study.service.http.web.way_in import RETURN_PATH
 from sprag_study.service.jobs import checks
+from sprag_study.service.jobs import users as user_records
 from sprag_study.service.jobs.housekeeping import Housekeeping
 from sprag_study.service.jobs.reports.reporter import Reporter
 from sprag_study.service.jobs.reports.watchdog import Watchdog, late_runs
@@ -228,6 +229,9 @@ class Application(FastAPI):
                 "SavedViewChange": view_spec.CHANGE.schema(),
                 "ScheduleRequest": SCHEDULE.schema(),
                 "ScheduleChange": SCHEDULE_CHANGE.schema(),
+                "NewUser": user_records.USER.schema(),
+                "UserChange": user_records.CHANGE.schema(),
+                "HandOver": user_records.HAND_OVER.schema(),
             }
             self.openapi_schema = build_openapi(self, schemas, self._settings.url_prefix)
         return self.openapi_schema

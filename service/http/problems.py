@@ -54,6 +54,7 @@ PROBLEM_TYPES: dict[Kind, ProblemType] = _catalogue(
     _P("schedule-not-found", 404, "Schedule not found", "It never existed or was deleted."),
     _P("component-not-found", 404, "Component not found", "It never existed or was deleted."),
     _P("view-not-found", 404, "Saved view not found", "It never existed, or was deleted itself or with its study."),
+    _P("user-not-found", 404, "User not found", "The names of users are at /api/v1/users, for administrators."),
     _P("case-not-found", 404, "Case not found", "Cases are numbered from 0."),
     _P("not-found", 404, "There is nothing at this address", "The addresses of the interface are at /help/interface."),
     _P(
@@ -61,6 +62,7 @@ PROBLEM_TYPES: dict[Kind, ProblemType] = _catalogue(
     ),
     _P("not-acceptable", 406, "No acceptable format", "`detail` names the available media types."),
     _P("wrong-state", 409, "The state of the study does not allow this", "Check the state of the study first."),
+    _P("user-exists", 409, "There is such a user already", "Change this one, or restore it where it is removed."),
     _P(
         "precondition-failed",
         412,

@@ -97,6 +97,9 @@ _DESIGNER: Final = (
 _ADMINISTRATOR: Final = (
     "GET /api/v1/audit",
     "GET /api/v1/users",
+    "POST /api/v1/users",
+    "PATCH /api/v1/users/{user}",
+    "POST /api/v1/users:hand-over",
     "GET /me/audit",
     "GET /me/users",
     "POST /me/users",

@@ -17,6 +17,7 @@ from sprag_study.service.client.wire import (
     preset_path,
     schedule_path,
     study_path,
+    user_path,
     view_path,
 )
 
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
     from sprag_study.service.answers.catalogue import Health, Model, Preset
     from sprag_study.service.answers.components import ComponentEntry
-    from sprag_study.service.answers.people import AuditEntry, Me, User
+    from sprag_study.service.answers.people import AuditEntry, HandedOver, Me, User
     from sprag_study.service.answers.saved_views import SavedViewEntry
     from sprag_study.service.answers.schedules import Night, ScheduleDetail, ScheduleSummary
     from sprag_study.service.answers.studies import ClutchFitReport, Preview
@@ -320,6 +321,26 @@ class Client(Connection):
     def users(self) -> list[User]:
         """Every user with role and quotas, by name; for administrators."""
         return cast("list[User]", (self.request("GET", "/users"))["users"])
+
+    def add_user(self, name: str, role: str = "designer", **limits: int | None) -> User:
+        """Add a user; for administrators.
+
+        Parameters
+        ----------
+        role : str
+            "viewer", "designer" or "administrator".
+        limits : int or None
+            ``most_cases``, ``most_bytes``, ``most_checks``; 0: no limit; None: as the settings have it.
+        """
+        return cast("User", self.request("POST", "/users", json={"name": name, "role": role, **limits}))
+
+    def change_user(self, name: str, **fields: Any) -> User:
+        """Change some fields of a user: ``role``, ``removed``, and the limits as of `add_user`; for administrators."""
+        return cast("User", self.request("PATCH", user_path(name), json=fields))
+
+    def hand_over_user(self, name: str, to: str) -> HandedOver:
+        """Give the studies, schedules, components and views of a user to another; for administrators."""
+        return cast("HandedOver", self.request("POST", "/users:hand-over", json={"name": name, "to": to}))
 
     def audit(
         self,

@@ -6,13 +6,12 @@ from fastapi import Request
 from starlette.responses import RedirectResponse, Response
 
 from sprag_study.service.actor import Role
-from sprag_study.service.http.access import COOKIE
+from sprag_study.service.http.access import COOKIE, access_of
 from sprag_study.service.http.problems import ApiError
 from sprag_study.service.http.routers import page_router
 from sprag_study.service.http.web.form.values import Form
 from sprag_study.service.http.web.way_in import (
     LOGIN_PATH,
-    access_of,
     is_secure,
     kept_form,
     kept_page,

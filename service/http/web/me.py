@@ -15,11 +15,11 @@ from sprag_study.service.actor import Role
 from sprag_study.service.delivery import origin_of
 from sprag_study.service.exports.audit import entry_json
 from sprag_study.service.faults import FaultError, choice_of
-from sprag_study.service.http.access import COOKIE
+from sprag_study.service.http.access import COOKIE, access_of
 from sprag_study.service.http.context import Context, Ctx
 from sprag_study.service.http.current import current
 from sprag_study.service.http.language import PARAMETER, keep_language
-from sprag_study.service.http.people import Action, Actor, Since, Target, Until, user_json
+from sprag_study.service.http.people import Action, Actor, Since, Target, Until
 from sprag_study.service.http.reading import PageChoice, keep, keep_zone
 from sprag_study.service.http.routers import page_router
 from sprag_study.service.http.threads import in_thread
@@ -40,9 +40,10 @@ from sprag_study.service.http.web.deployment import (
 )
 from sprag_study.service.http.web.form.values import Form
 from sprag_study.service.http.web.templates import page
-from sprag_study.service.http.web.way_in import access_of, within
+from sprag_study.service.http.web.way_in import within
 from sprag_study.service.jobs.reports.channels import DeliveryError
 from sprag_study.service.jobs.reports.trial import try_mail, try_webhook
+from sprag_study.service.jobs.users import user_json
 from sprag_study.service.jobs.workers import worker_list
 from sprag_study.service.languages import N_, _
 from sprag_study.service.reading.faults import message

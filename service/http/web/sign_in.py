@@ -12,6 +12,7 @@ from starlette.responses import RedirectResponse, Response
 
 from sprag_study.sentences import Sentence
 from sprag_study.service.faults import FaultError
+from sprag_study.service.http.access import access_of
 from sprag_study.service.http.context import Context, Ctx
 from sprag_study.service.http.current import knowing
 from sprag_study.service.http.oidc import (
@@ -32,7 +33,6 @@ from sprag_study.service.http.web.way_in import (
     LOGIN_PATH,
     OIDC_PATH,
     RETURN_PATH,
-    access_of,
     is_secure,
     login_page,
     origin,

@@ -12,7 +12,7 @@ from urllib.parse import quote, urlsplit
 
 from starlette.responses import RedirectResponse
 
-from sprag_study.service.http.access import COOKIE, SESSION_SECONDS, Access
+from sprag_study.service.http.access import COOKIE, SESSION_SECONDS, access_of
 from sprag_study.service.http.grants import Grant
 from sprag_study.service.http.web.form.values import read_form
 from sprag_study.service.http.web.problem_page import wants_page
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from starlette.requests import Request
     from starlette.responses import Response
 
+    from sprag_study.service.http.access import Access
     from sprag_study.service.http.problems import ApiError
     from sprag_study.service.http.web.form.entries import Values
 
@@ -37,11 +38,6 @@ KEPT_PREFIX: Final = "kept "
 _LONGEST: Final = 4000
 #: Problems that a login can solve, and the message of the login where a form was sent.
 _MENDED: Final = frozenset({"unauthorized", "read-only"})
-
-
-def access_of(request: Request) -> Access:
-    """The service's `Access`."""
-    return cast("Access", request.app.state.access)
 
 
 def is_secure(request: Request) -> bool:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 import sqlalchemy as sa
 
 from sprag_study.sentences import Sentence
-from sprag_study.service.actor import Door, Role, act_as, acting
+from sprag_study.service.actor import SERVED, Role, act_as, acting
 from sprag_study.service.faults import FaultError, parameter_error
 from sprag_study.service.languages import N_, grouped, recorded
 from sprag_study.service.storage.components import COMPONENTS
@@ -26,7 +26,7 @@ from sprag_study.service.storage.errors import TokenNotFoundError, UserExistsErr
 from sprag_study.service.storage.part import Part, micros_of, moment, optional_moment
 from sprag_study.service.storage.people.audit import differences, note
 from sprag_study.service.storage.people.pools import pool_of
-from sprag_study.service.storage.people.scopes import TokenScope, TokenState
+from sprag_study.service.storage.people.scopes import TokenScope, TokenState, require_one_limit
 from sprag_study.service.storage.people.tables import ENDED_SESSIONS, SESSION_KEY, TOKENS, USERS
 from sprag_study.service.storage.saved_views import SAVED_VIEWS
 from sprag_study.service.storage.schedules.tables import SCHEDULES
@@ -188,13 +188,10 @@ class People(Part):
         A number of ``quota`` that is None is kept, but where ``as_set`` names it (cases, bytes, checks): then the
         settings have it again; both at once raise FaultError. Tokens of a removed user are worth nothing until the user
         is restored, which forgets the account at the OpenID provider; sessions from there end. A removed user is
-        not removed again, nor an active one restored. On pages the last administrator stays: raises FaultError.
+        not removed again, nor an active one restored. In a service the last administrator stays: raises FaultError.
         """
         given = {column: value for column, value in _columns(quota or Quota()).items() if value is not None}
-        both = [number for number in as_set if f"most_{number}" in given]
-        if both:
-            where = "storage" if both[0] == "bytes" else both[0]
-            raise parameter_error(where, "conflict", N_("is a number, and as set for all users: give one of them"))
+        require_one_limit({column.removeprefix("most_") for column in given}, as_set)
         values: dict[str, Any] = {**given, **({} if role is None else {"role": role.value})}
         values |= {f"most_{number}": None for number in as_set}
         with self.session.write() as connection:
@@ -209,7 +206,7 @@ class People(Part):
                 values |= {"removed_at": None, "subject": None, "issuer": None}
             if not values:
                 return _user_record(old)
-            before = acting().door is Door.PAGE and _is_administered(connection)
+            before = acting().door in SERVED and _is_administered(connection)
             row = connection.execute(sa.update(USERS).where(_U.name == name).values(values).returning(USERS)).one()
             if before and not _is_administered(connection):
                 raise parameter_error("role", "conflict", N_("is that of the last administrator"), name)
@@ -473,12 +470,12 @@ def _salt() -> str:
 
 
 def _require_standing(connection: sa.Connection, now: int) -> None:
-    """Raise FaultError where who acts on a page was removed or revoked meanwhile, or is no longer an administrator.
+    """Raise FaultError where who acts in a service was removed or revoked meanwhile, or is no longer an administrator.
 
     A service reads users and tokens anew every two seconds; what it read must not decide who may let people in.
     """
     actor = acting()
-    if actor.door is not Door.PAGE:
+    if actor.door not in SERVED:
         return
     user = connection.execute(sa.select(USERS).where(_U.name == actor.user)).one_or_none()
     token = connection.execute(sa.select(TOKENS.c.revoked_at).where(TOKENS.c.id == actor.token)).one_or_none()

@@ -1,5 +1,8 @@
-"""Scopes of tokens, and names of users and tokens, apart from their storage: the command line starts without it."""
+"""Scopes of tokens, names of users and tokens, limits of users, apart from their storage: the command line starts
+without it.
+"""
 
+from collections.abc import Collection
 from enum import StrEnum
 from typing import Final
 
@@ -25,6 +28,14 @@ def token_name(text: str, where: str = "name") -> str:
         allowed = _("1 to {most} printable characters in one line", most=MAX_NAME_LENGTH)
         raise parameter_error(where, "invalid-text", N_("is not the name of a token"), text, allowed)
     return text
+
+
+def require_one_limit(numbers: Collection[str], as_set: Collection[str]) -> None:
+    """Raise FaultError where a limit of a user (cases, bytes, checks) is a number, and as set for all users, too."""
+    for limit in as_set:
+        if limit in numbers:
+            where = "storage" if limit == "bytes" else limit
+            raise parameter_error(where, "conflict", N_("is a number, and as set for all users: give one of them"))
 
 
 class TokenScope(StrEnum):

@@ -50,6 +50,7 @@ OTHERS = {
     "admin db check": "reads",
     "admin db backup": "writes another file",
     "admin db audit": "reads",
+    "admin audit": "reads",
     "admin db move": "writes another database, which has the log of this one",
     "admin db adopt": "changes a copy only; tests/service/schedules/test_copies.py",
     "admin db upgrade": "test_an_upgrade_is_in_the_log_of_the_new_revision",
@@ -126,6 +127,7 @@ def test_commands_that_read_leave_no_row(known: tuple[Store, dict[str, str]], tm
         "admin user list",
         "admin db check",
         "admin db audit",
+        "admin audit",
         f"admin db backup {backup}",
         "admin db prune --older-than 9",
     ):

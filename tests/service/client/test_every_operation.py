@@ -26,6 +26,10 @@ STUDY = {
     "finish_by": None,
     "progress": {"done": 1, "total": 1, "ok": 1, "rate": None, "seconds_left": None, "in_time": None},
 }  # fmt: skip
+USER = {
+    "role": "viewer", "created_at": "2026-11-28T06:00:00Z", "removed_at": None, "most_cases": None, "most_bytes": None,
+    "most_checks": None, "quota": {"cases": 0, "bytes": 0},
+}  # fmt: skip
 LOAD, SPEED = "shaft.load", "shaft.speed.mean"
 
 Call = Callable[[Any, Any], Any]
@@ -91,8 +95,14 @@ OPERATIONS: dict[str, tuple[Call, str]] = {
     "get_preset": (lambda c, _: c.preset("feeder"), "- `sprag presets` asks no service"),
     "list_workers": (lambda c, _: c.workers(), "admin workers"),
     "get_me": (lambda c, _: c.me(), "login http://localhost --token x"),
-    "list_users": (lambda c, _: c.users(), "- `sprag admin user list` reads the database"),
-    "get_audit": (lambda c, _: c.audit(), "- `sprag admin db audit` reads the database"),
+    "list_users": (lambda c, _: c.users(), "admin user list --server http://sprag"),
+    "add_user": (lambda c, _: c.add_user("eve"), "admin user add eve --server http://sprag"),
+    "change_user": (lambda c, _: c.change_user("dora", removed=True), "admin user remove dora --server http://sprag"),
+    "hand_over_user": (
+        lambda c, _: c.hand_over_user("dora", "emil"),
+        "admin user hand-over dora --to emil --server http://sprag",
+    ),
+    "get_audit": (lambda c, _: c.audit(), "admin audit --server http://sprag"),
     "livez": (lambda c, _: c.live(), "- for the supervisor of the service"),
     "readyz": (lambda c, _: c.ready(), "- for load balancers; `sprag admin doctor` looks for causes"),
     "metrics": (lambda c, _: c.metrics(), "- for Prometheus"),
@@ -100,7 +110,7 @@ OPERATIONS: dict[str, tuple[Call, str]] = {
 
 
 class Recorder:
-    """A service that knows one study, refuses everything else, and remembers what it was asked."""
+    """A service that knows one study and two users, refuses everything else, and remembers what it was asked."""
 
     def __init__(self) -> None:
         self.asked: list[tuple[str, str]] = []
@@ -110,6 +120,8 @@ class Recorder:
         self.asked.append((request.method.lower(), request.url.path))
         if self.asked[-1] == ("get", f"/api/v1/studies/{ID}"):
             return httpx.Response(200, json=STUDY)
+        if self.asked[-1] == ("get", "/api/v1/users"):
+            return httpx.Response(200, json={"users": [{**USER, "name": name} for name in ("dora", "emil")]})
         return httpx.Response(418, json={"title": "refused"})
 
     def reached(self, method: str, template: str) -> bool:

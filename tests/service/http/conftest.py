@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import pytest
 from pydantic import SecretStr
 
 from sprag_study.service.http import access
+from sprag_study.service.http.app import create_app
 from sprag_study.service.http.attempts import Attempts
 from tests.service.http.openid import CLIENT, Openid, openid
 from tests.service.http.people import Office
@@ -27,6 +29,17 @@ def ended(service: Service, spec: dict[str, Any]) -> str:
     study_id = service.submit(spec)
     service.fill(study_id)
     return study_id
+
+
+@pytest.fixture
+def with_token(service: Service, settings: Settings, connect: Callable[..., httpx.Client]) -> Service:
+    """The service with SPRAG_TOKEN, whose client sends it: one without a login takes no first user from programs."""
+    token = "correct-horse-battery-staple"
+    guarded = settings.model_copy(update={"token": SecretStr(token)})
+    app = create_app(
+        guarded, store=service.store, computer=service.computer, checker=service.checker, writer=service.writer
+    )
+    return replace(service, app=app, http=connect(app, headers={"Authorization": f"Bearer {token}"}))
 
 
 @pytest.fixture

@@ -77,6 +77,9 @@ FURTHER_RULES: Final = (
     "get_forces",
     "get_strobes",
     "get_audit",
+    "add_user",
+    "change_user",
+    "hand_over_user",
 )
 
 

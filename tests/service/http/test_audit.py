@@ -16,6 +16,7 @@ from sprag_study.service.http.api import examples
 from sprag_study.service.http.roles import ROLES
 from sprag_study.service.storage.people.audit import AuditFilter
 from tests.service.calibrating import CALIBRATE
+from tests.service.http.api.test_users import CHANGES as OF_USERS
 from tests.service.http.people import OWN, Office
 from tests.service.swept_study import swept_study
 from tests.service.timed_spec import SPEC
@@ -228,8 +229,8 @@ def office(settings: Settings, service: Service, connect: Callable[..., httpx.Cl
 
 def test_every_route_that_changes_something_is_walked() -> None:
     changing = {route for route, role in ROLES.items() if role not in {None, Role.VIEWER} and route[:4] != "GET "}
-    # What administrators change: tests/service/http/web/test_administration.py.
-    assert changing == {*CHANGES, "POST /me/users", "POST /me/settings", "POST /me/backups"}
+    # What administrators change: tests/service/http/web/test_administration.py, tests/service/http/api/test_users.py.
+    assert changing == {*CHANGES, *OF_USERS, "POST /me/users", "POST /me/settings", "POST /me/backups"}
 
 
 @pytest.mark.parametrize("route", CHANGES)

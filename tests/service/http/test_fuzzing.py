@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from pydantic import SecretStr
 
+from sprag_study.service.actor import Role
 from sprag_study.service.http import attempts
 from sprag_study.service.http.api.schedules import EXAMPLE
 from sprag_study.service.http.app import create_app
@@ -73,7 +74,9 @@ def things(service: Service) -> dict[str, list[Any]]:
         service.fill(study_id)
     service.fill(begun, range(4))
     kept = [service.http.post("/api/v1/schedules", json=EXAMPLE).json()["id"] for _ in range(2)]
-    return {"study_id": [begun, *ended], "case": [0], "schedule_id": kept}
+    for name in ("dora@example.com", "emil@example.com"):  # of the examples of bodies
+        service.store.people.add_user(name, Role.DESIGNER)
+    return {"study_id": [begun, *ended], "case": [0], "schedule_id": kept, "user": ["dora@example.com"]}
 
 
 def test_made_up_requests_are_answered_as_documented(

@@ -89,9 +89,9 @@ def computed(study: Study, known: dict[str, ChunkResult] = {}) -> ChunkResult:  
     return known[text]
 
 
-def record_examples(service: Service, document: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+def record_examples(with_token: Service, document: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     """Write the file of examples: those that it lacks, and those that no longer fit."""
-    found: dict[str, dict[str, Any]] = {}
+    service, found = with_token, dict[str, dict[str, Any]]()
     by_name = {f"{method} {path}": (path, method, operation) for path, method, operation in operations(document)}
     for name, media, content in answers(document):
         kept = answer_examples.recorded().get(name, {}).get(media)

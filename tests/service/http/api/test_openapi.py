@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,12 +14,14 @@ from fastapi.routing import iter_route_contexts
 from openapi_spec_validator import OpenAPIV31SpecValidator
 from pydantic import SecretStr
 
+from sprag_study.service.actor import Role
 from sprag_study.service.http.api.components import EXAMPLE as COMPONENTS
 from sprag_study.service.http.api.examples import SPEC
 from sprag_study.service.http.api.schedules import EXAMPLE
 from sprag_study.service.http.app import create_app
 from sprag_study.service.http.guard import OPEN_PATHS
 from sprag_study.service.http.problems import PROBLEM_TYPES
+from sprag_study.service.storage.errors import UserExistsError
 from tests.service.calibrating import calibration
 from tests.service.searching import search
 from tests.service.swept_study import swept_study
@@ -33,6 +36,7 @@ if TYPE_CHECKING:
 
     Connect = Callable[..., httpx.Client]
 
+TOKEN = "correct-horse-battery-staple"
 METHODS = ("get", "post", "patch", "delete")
 TOLERANT = {**SPEC, "tolerances": [{"path": "shaft.inertia", "plus_minus": "5 %"}], "drives": 4}
 
@@ -81,9 +85,9 @@ def test_links_give_what_their_targets_take(document: dict[str, Any]) -> None:
 
 
 def test_the_document_says_whether_a_token_is_needed(service: Service, settings: Settings, connect: Connect) -> None:
-    with_token = settings.model_copy(update={"token": SecretStr("correct-horse-battery-staple")})
+    with_token = settings.model_copy(update={"token": SecretStr(TOKEN)})
     app = create_app(with_token, store=service.store, computer=service.computer, checker=service.checker)
-    header = {"Authorization": "Bearer correct-horse-battery-staple"}
+    header = {"Authorization": f"Bearer {TOKEN}"}
     guarded = connect(app).get("/openapi.json", headers=header).json()
     opened = service.http.get("/openapi.json").json()
     assert guarded["components"] == opened["components"]
@@ -143,6 +147,11 @@ def sent_to(
     if "{component_id}" in path:
         made = service.http.post("/api/v1/components", json=COMPONENTS).json()["components"]
         address = address.replace("{component_id}", made[0]["id"])
+    if "/users" in path:
+        for name in ("dora@example.com", "emil@example.com"):
+            with suppress(UserExistsError):
+                service.store.people.add_user(name, Role.DESIGNER)
+        address = address.replace("{user}", "dora@example.com")
     if "{view_id}" in path:
         curves = {"page": "curves", "name": "loads", "study": study_id, "in_report": True}
         saved = service.http.post("/api/v1/views", json=curves).json()["id"]
@@ -195,7 +204,8 @@ def studied(service: Service, path: str) -> str:
     return study_id
 
 
-def test_every_example_works(service: Service, document: dict[str, Any]) -> None:
+def test_every_example_works(with_token: Service, document: dict[str, Any]) -> None:
+    service = with_token
     for path, method, operation in operations(document):
         study_id = studied(service, path)
         for answer in sent_to(service, path, method, operation, study_id):

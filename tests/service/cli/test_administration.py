@@ -1,0 +1,138 @@
+"""`sprag admin user` and `sprag admin audit` of a service and of its database: the same answers."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import httpx
+import pytest
+
+from sprag_study.service import client as clients
+from sprag_study.service.storage.people.audit import AuditFilter
+from tests.conftest import Finished
+from tests.service.conftest import PortalTransport
+from tests.service.http.people import Office
+
+if TYPE_CHECKING:
+    from anyio.from_thread import BlockingPortal
+
+    from sprag_study.service.settings import Settings
+    from tests.service.conftest import Service
+
+SERVER = "http://localhost"
+Run = Callable[..., Finished]
+
+
+@pytest.fixture
+def office(
+    settings: Settings,
+    service: Service,
+    connect: Callable[..., httpx.Client],
+    portal: BlockingPortal,
+    monkeypatch: pytest.MonkeyPatch,
+) -> Office:
+    """A service that commands with a server ask; the database of the settings is that of this test."""
+    opened = Office(settings, service, connect)
+    monkeypatch.setattr(clients, "Client", partial(clients.Client, transport=PortalTransport(opened.app, portal)))
+    monkeypatch.setenv("SPRAG_DATABASE", settings.database)
+    return opened
+
+
+@pytest.fixture
+def asked(sprag: Run, office: Office) -> Run:
+    """Runs a command as an administrator of the service, from any host."""
+    return partial(sprag, "--server", SERVER, "--token", office.tokens["ada"])
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["user list", "user add eve --role viewer --cases 10 --storage 3 --checks 0",
+     "user change dora --role administrator --cases 5", "user change do --as-set cases", "user remove dora",
+     "user restore dora", "user hand-over dora --to vera"],
+)  # fmt: skip
+def test_users_are_the_same_by_the_service_and_in_its_database(
+    asked: Run, sprag: Run, office: Office, words: str
+) -> None:
+    remote = asked("admin", *words.split(), "--json")
+    assert remote.code == 0, remote.err
+    (entry, *_) = office.store.audit.page(AuditFilter()).records
+    if words not in ("user list", "user restore dora", "user change do --as-set cases"):  # these change nothing
+        assert (entry.door, entry.actor, entry.token) == ("api", "ada", office.ids["ada"])
+    if words.startswith("user add"):
+        with office.store.session.write() as connection:
+            connection.exec_driver_sql("DELETE FROM users WHERE name = 'eve'")
+    here = sprag("admin", *words.split(), "--json")
+    told, kept = json.loads(remote.out), json.loads(here.out)
+    assert told.pop("server") == SERVER
+    assert kept.pop("database").endswith(Path(office.store.session.location).name)
+    for answer in (told, kept):
+        answer.pop("created_at", None)
+    assert told == kept
+
+
+def test_the_log_is_the_same_by_the_service_and_in_its_database(
+    asked: Run, sprag: Run, office: Office, tmp_path: Path
+) -> None:
+    office.store.people.change_user("dora", removed=True)
+    filters = ("--action", "user.add", "--actor", office.store.audit.page(AuditFilter()).records[-1].actor)
+    for more in ((), ("--format", "jsonl"), ("--json",), filters, ("--since", "2999-01-01"), ("--json", *filters)):
+        remote, here = asked("admin", "audit", *more), sprag("admin", "audit", *more)
+        assert (remote.code, remote.out) == (0, here.out), (more, remote.err)
+        assert here.out == sprag("admin", "db", "audit", *more).out
+    file = tmp_path / "log.csv"
+    assert asked("admin", "audit", "-o", file).code == 0
+    assert "user.remove,dora" in file.read_text()
+
+
+def test_what_the_service_refuses_is_said_as_of_the_database(asked: Run, sprag: Run, office: Office) -> None:
+    for words, code in (
+        ("user add dora", "user-exists"),
+        ("user change nobody --role viewer", "user-not-found"),
+        ("user change dora --cases 5 --as-set cases", "invalid-parameter"),
+        ("user hand-over dora --to dora", "invalid-parameter"),
+        ("audit --since yesterday", "invalid-parameter"),
+    ):
+        remote, here = asked("admin", *words.split(), "--json"), sprag("admin", *words.split(), "--json")
+        assert (remote.code, json.loads(remote.err)["code"]) == (2, code), words
+        told, kept = (
+            [fault.get("parameter", fault.get("pointer")) for fault in json.loads(done.err).get("problems", ())]
+            for done in (remote, here)
+        )
+        assert told == kept, words
+    designer = ("--server", SERVER, "--token", office.tokens["dora"])
+    assert sprag(*designer, "admin", "user", "list").code == 3
+    last = asked("admin", "user", "remove", "ada")
+    assert (last.code, "last administrator" in last.err) == (2, True)
+
+
+def test_the_service_is_asked_where_one_is_chosen(
+    sprag: Run, office: Office, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """By an option, or by the environment or a login on a machine without a database; never with --db."""
+
+    def place(*options: str) -> str:
+        done = sprag("admin", "user", "list", "--json", *options)
+        assert done.code == 0, done.err
+        return next(iter(json.loads(done.out)))
+
+    assert place() == "database"
+    folder = tmp_path / "config"
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(folder))
+    assert sprag("login", SERVER, "--token", office.tokens["ada"]).code == 0
+    assert place() == "database", "this machine has one"
+    monkeypatch.setenv("SPRAG_SERVER", SERVER)
+    assert place() == "database", "a variable of the host of the service"
+    assert place("--server", SERVER) == "server"
+    assert place("--server", SERVER, "--db", office.store.session.location) == "database"
+    monkeypatch.setenv("SPRAG_DATABASE", str(tmp_path / "none.sqlite3"))
+    assert place() == "server"
+    monkeypatch.delenv("SPRAG_SERVER")
+    assert place() == "server"
+    assert "service http://localhost:" in sprag("admin", "user", "list").err
+    assert sprag("logout").code == 0
+    nothing = sprag("admin", "user", "list")
+    assert (nothing.code, "there is no database" in nothing.err) == (2, True)
