@@ -13,6 +13,7 @@ from sprag_study.service.faults import FaultError, choice_of
 from sprag_study.service.figures.forces import body_label, forces_figure
 from sprag_study.service.languages import N_, _
 from sprag_study.service.reading.reader import Phrase, joined
+from sprag_study.service.results.regimes import motion_sentence
 from sprag_study.service.views.amounts import Range, amount_of
 from sprag_study.service.views.case_questions import FORCES, ForcesQuestion
 from sprag_study.service.views.case_view import CaseAnswer, CaseView, Said
@@ -132,11 +133,15 @@ class ForcesView(CaseView[ForcesQuestion, tuple[Bearing, int, str], Forces]):
         return {"shaft_mass": Offered(hint="0 kg"), "load_rating": Offered(hint="N"), "share": Offered(hint="1")}
 
     def shown(self, answer: ForcesAnswer) -> Shown:
-        """The largest force and the life, and tables of the results; or why the case did not end ok."""
+        """The largest force and the life, and tables of the results; or why the case did not end ok.
+
+        Where the motion has no orbit, that comes first.
+        """
         made = answer.result
         if made.ending != models.OK:
             return Shown((Phrase(models.ENDING_SENTENCES[made.ending]),))
-        return Shown(_sentences(made), _tables(made))
+        irregular = made.regime in models.flags_of(answer.study.model)
+        return Shown([*([motion_sentence(made.regime, None)] if irregular else []), *_sentences(made)], _tables(made))
 
     def said(self, answer: ForcesAnswer) -> Said:
         """The results, or how the case ended."""
@@ -159,9 +164,13 @@ def _sentences(made: Forces) -> list[str]:
     ]
     life, load = found["bearing.rating_life.time"], found["bearing.equivalent_load"]
     if math.isfinite(life):
-        hours = Amount(life / 3600.0, digits=4)
-        text = "The basic rating life of the bearing is {hours} h under the dynamic equivalent load {load}."
-        said.append(Phrase(text, hours=hours, load=Amount(load, "N")))
+        said.append(
+            Phrase(
+                "The basic rating life of the bearing is {hours} h under the dynamic equivalent load {load}.",
+                hours=Amount(life / 3600.0, digits=4),
+                load=Amount(load, "N"),
+            )
+        )
     elif not math.isfinite(load):
         said.append(Phrase("The shaft does not turn, so that its bearings have no rating life."))
     return said

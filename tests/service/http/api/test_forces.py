@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import csv
 import io
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from sprag_study.service.answers.forces import Forces
 from sprag_study.service.client import Client
+from sprag_study.service.views.case_questions import ForcesQuestion
+from sprag_study.service.views.case_view import see
+from sprag_study.service.views.forces import ForcesView
 from sprag_study.worker import models
 from tests.service.conftest import API, PortalTransport, Service
 from tests.service.shapes import fits
@@ -109,3 +113,13 @@ def test_the_page_of_a_case_shows_them(service: Service, one_case: str) -> None:
     for title in ("Forces on the table", "Power of the vibration", "Springs", "Bearing of the shaft"):
         assert title in text
     assert "csv, forces over time" in text
+    text = service.http.get(f"{own}?show=forces&load_rating=12+kN", headers={"Accept-Language": "uk"}).text
+    assert "Номінальний ресурс підшипника: " in text
+
+
+def test_a_motion_without_an_orbit_is_said_to_have_none(service: Service, one_case: str) -> None:
+    study, view = service.store.studies.study(one_case), ForcesView()
+    answer = see(study, 4, view, view.choose(study, 4, ForcesQuestion()), None)
+    irregular = replace(answer, result=replace(answer.result, regime="irregular"))
+    assert view.shown(irregular).sentences[0] == models.REGIME_SENTENCES["irregular"]
+    assert view.shown(irregular).sentences[1:] == view.shown(answer).sentences
