@@ -14,7 +14,7 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from sprag_study.engine.machine_shaft import kernels
-from sprag_study.engine.machine_shaft.quadrature import gauss, product
+from sprag_study.engine.quadrature import gauss, product
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

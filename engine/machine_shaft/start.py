@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from sprag_study.engine import elementary
 from sprag_study.engine.machine_shaft.panels import Extremes, Panels, Points
-from sprag_study.engine.machine_shaft.quadrature import gauss
 from sprag_study.engine.machine_shaft.spec import MeanSpeed
+from sprag_study.engine.quadrature import gauss
 
 Floats = NDArray[np.float64]
 

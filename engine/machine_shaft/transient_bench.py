@@ -14,10 +14,10 @@ from sprag_study.engine.machine_shaft.machine import Fields, Machine
 from sprag_study.engine.machine_shaft.motor import characteristic, limit_cycle
 from sprag_study.engine.machine_shaft.operations import SpeedLaw
 from sprag_study.engine.machine_shaft.panels import COEFFICIENTS, NODES, Panels, apply
-from sprag_study.engine.machine_shaft.quadrature import product
 from sprag_study.engine.machine_shaft.spec import MachineSpec
 from sprag_study.engine.machine_shaft.speed_course import follows_speed
 from sprag_study.engine.machine_shaft.start import Shape, mean_speed
+from sprag_study.engine.quadrature import product
 
 Floats = NDArray[np.float64]
 

@@ -9,10 +9,10 @@ from sprag_study.engine.machine_shaft import transient_kernel as kernel
 from sprag_study.engine.machine_shaft.motor import characteristic, motor_torque
 from sprag_study.engine.machine_shaft.motor_tables import MotorTable
 from sprag_study.engine.machine_shaft.panels import COEFFICIENTS, INTEGRAL, RUNNING, SAMPLES, TAIL, WEIGHTS, apply
-from sprag_study.engine.machine_shaft.quadrature import product
 from sprag_study.engine.machine_shaft.transient_bench import Bench, Cycle
 from sprag_study.engine.machine_shaft.transient_causes import Ends
 from sprag_study.engine.machine_shaft.transient_course import Course, Outcome
+from sprag_study.engine.quadrature import product
 from sprag_study.sentences import Sentence
 
 Floats = NDArray[np.float64]

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from sprag_study.engine import elementary
 from sprag_study.engine.endings import ENDINGS, Ending
 from sprag_study.engine.outcome import Forces, Trajectory
+from sprag_study.engine.quadrature import gauss
 from sprag_study.engine.run import Run, SettledRun
 from sprag_study.engine.vibration_drive.cases import case_matrix, default_of, scalars, with_lengths
 from sprag_study.engine.vibration_drive.engagements import MAX_PERIODS, read_steps
@@ -23,7 +24,7 @@ from sprag_study.engine.vibration_drive.formulas import base_series, drive, free
 from sprag_study.engine.vibration_drive.integration import integrate
 from sprag_study.engine.vibration_drive.kernel import Kernel, kernel_of
 from sprag_study.engine.vibration_drive.layout import PendulumSample, pendulum_samples
-from sprag_study.engine.vibration_drive.pieces import Pieces, integrals
+from sprag_study.engine.vibration_drive.pieces import Pieces
 from sprag_study.engine.vibration_drive.regimes import Regime
 from sprag_study.engine.vibration_drive.settle import settle
 from sprag_study.engine.vibration_drive.strobes import BEGIN
@@ -34,8 +35,8 @@ Ints = NDArray[np.int64]
 _Values = Callable[[Ints, Floats], Floats]
 
 #: Nodes of a step's quadrature. It is exact up to degree 31, beyond the square of a step's series.
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
-_NODES, _WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
+_GAUSS = gauss(16)
+_NODES, _WEIGHTS = 0.5 * (1.0 + _GAUSS[0]), 0.5 * _GAUSS[1]
 #: Places of a step at which extremes are looked for, and how often the best of them is looked at more closely: each
 #: time the interval is an eighth of the one before, and the error a 64th.
 _PLACES, _CLOSER = np.linspace(0.0, 1.0, 17), 6
@@ -204,7 +205,8 @@ class _Motion:
     @classmethod
     def read(cls, values: Mapping[str, float], pieces: Pieces, first: Floats, shaft_mass: float) -> "_Motion":
         n = len(first)
-        turned = np.column_stack([integrals(pieces.speeds[:, i], pieces.length) for i in range(n)])
+        whole = np.ones((len(pieces.length), 1))
+        turned = pieces.length[:, np.newaxis] * _primitives(pieces.speeds.swapaxes(0, 1), whole)[:, :, 0].T
         angles = first + np.vstack([np.zeros((1, n)), np.cumsum(turned, axis=0)[:-1]])
         nu = 2.0 * math.pi * values["excitation.frequency"]
         base = tuple(_value(values, f"excitation.{name}") for name in ("amplitude_x", "amplitude_y", "phase"))
@@ -299,7 +301,7 @@ def _results(motion: _Motion, values: Mapping[str, float], bearing: Bearing) -> 
     now = motion.at(steps, np.tile(_NODES, (len(steps), 1)))
 
     def mean(of: Floats) -> float:
-        return float(np.sum(motion.pieces.length * (of @ _WEIGHTS))) / time
+        return float(np.sum(motion.pieces.length * np.sum(of * _WEIGHTS, axis=1))) / time
 
     total = motion.on_table(now)
     bodies = {f"pendulums.{i}": (now.x[i], now.y[i]) for i in range(motion.n)} | {"table": total}
@@ -379,9 +381,10 @@ def _bearing(
     out["bearing.load.max"] = bearing.share * out["table.force.max"]
     out["bearing.load.rms"] = bearing.share * out["table.force.rms"]
     x, y = (out[f"table.force_{direction}.mean"] for direction in "xy")
-    out["bearing.load.mean"] = bearing.share * math.hypot(x, y)
+    size = math.sqrt(x * x + y * y)
+    out["bearing.load.mean"] = bearing.share * size
     # A mean that is a rounding error of the largest force has no direction.
-    if math.hypot(x, y) > 1e-9 * out["table.force.max"]:
+    if size > 1e-9 * out["table.force.max"]:
         out["bearing.load.direction"] = float(elementary.arctan2(y, x))
     turning = np.abs(speed)
     rate = mean(turning)

@@ -16,7 +16,7 @@ from tests.worker import fakes
 #: constants that are rounded to 14 digits or refined to all of theirs.
 ELSEWHERE = {
     *(f"vibration_drive/{name}.py" for name in ("clutch", "singular_values", "pieces")),
-    "machine_shaft/quadrature.py",
+    "quadrature.py",
     "taylor/straight.py",
 }
 BLAS = {"matmul", "dot", "vdot", "inner", "tensordot", "einsum", "linalg", "leggauss", "convolve", "polyfit", "roots"}

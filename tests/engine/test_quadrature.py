@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import legendre
 
-from sprag_study.engine.machine_shaft.quadrature import gauss, product
+from sprag_study.engine.quadrature import gauss, product
 
 
 @pytest.mark.parametrize("count", [2, 5, 12, 24])
