@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from sprag_study.service.cli import audit, database, doctor, processes, token, user, workers
+from sprag_study.service.cli import audit, database, doctor, health, processes, token, user, workers
 from sprag_study.service.cli.described import listing
 from sprag_study.service.cli.groups import Groups
 from sprag_study.service.cli.options import Database
@@ -14,6 +14,8 @@ app = typer.Typer(
 )
 app.callback()(listing(db=Database))
 app.command("doctor")(doctor.doctor)
+app.command("health")(health.health)
+app.command("metrics")(health.metrics)
 app.command("audit")(audit.audit)
 app.command("worker")(processes.worker)
 app.command("workers")(workers.workers)

@@ -32,6 +32,11 @@ def wants_json() -> bool:
     return CURRENT.get().json
 
 
+def names_service() -> bool:
+    """Whether the command line names a service, which then answers what the command can also find out by itself."""
+    return bool(CURRENT.get().server)
+
+
 def access() -> Access:
     """The address of the service and its token (`sprag_study.service.login`), an option before anything else."""
     given = CURRENT.get()

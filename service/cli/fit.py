@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sprag_study.service.cli.common import wants_json
+from sprag_study.service.cli.common import names_service, wants_json
 from sprag_study.service.cli.console import (
     WrongInputError,
     cell_text,
@@ -20,14 +21,16 @@ from sprag_study.service.cli.console import (
     wrong_option,
 )
 from sprag_study.service.cli.files import MAX_DATA_BYTES, decode, read_bytes
+from sprag_study.service.cli.remote import connection
 from sprag_study.service.faults import Fault, warned
 from sprag_study.service.languages import N_, _
 from sprag_study.service.reading.numbers import parse_number
 from sprag_study.service.reading.texts import shorten
 
 if TYPE_CHECKING:
+    from sprag_study.service.answers.studies import ClutchFitReport, FitDegree
     from sprag_study.service.spec.measured import MeasuredData
-    from sprag_study.worker.models import ClutchFit, DegreeReport
+    from sprag_study.worker.models import DegreeReport
 
 _DEGREE_COLUMNS = (
     (N_("degree"), True),
@@ -63,14 +66,16 @@ def fit(
 ) -> None:
     """Fit the clutch polynomial of lowest degree that reaches the accuracy, and report on it.
 
-    Reads a text file of two columns, angle and torque, with or without a header that names the units.
+    Reads a text file of two columns, angle and torque, with or without a header that names the units. With --server
+    that service fits it.
     """
     lost_motion = _quantity("--backlash", backlash, "rad")
     if lost_motion and not angles_include_backlash:
         message = N_("is taken off the angles only with --angles-include-backlash")
         raise wrong_option("--backlash", "not-used", message, backlash)
     measured = _measured(data)
-    made = _fitted(
+    fitted = _asked if names_service() else _fitted
+    made, warnings = fitted(
         measured,
         accuracy=_quantity("--accuracy", accuracy, "N*m"),
         backlash=lost_motion,
@@ -78,12 +83,12 @@ def fit(
         through_origin=not full,
         angles_include_backlash=angles_include_backlash,
     )
+    warnings = (*measured.warnings, *warnings)
     if wants_json():
-        from sprag_study.service.results.fits import fit_json
-
-        write_json({**fit_json(made), **warned((*measured.warnings, *made.warnings))})
+        write_json({**made, **warned(warnings)})
     else:
         _report(measured, made)
+        say(*warning_lines(warnings))
 
 
 def _quantity(option: str, text: str, unit: str) -> float:
@@ -106,11 +111,21 @@ def _measured(path: str) -> MeasuredData:
         raise WrongInputError("invalid-data", _("{file}: no measured clutch data", file=path), error.faults) from error
 
 
-def _fitted(measured: MeasuredData, *, accuracy: float, **options: Any) -> ClutchFit:
+def _asked(measured: MeasuredData, **options: Any) -> tuple[ClutchFitReport, Sequence[str]]:
+    """The fit by the service that is named, and its warnings."""
+    with connection() as client:
+        made = client.fit_clutch(measured.rows.tolist(), **options)
+    return made, made["warnings"]
+
+
+def _fitted(measured: MeasuredData, *, accuracy: float, **options: Any) -> tuple[ClutchFitReport, Sequence[str]]:
+    """The fit by this program, and its warnings."""
+    from sprag_study.service.results.fits import fit_json
     from sprag_study.worker.models import ClutchFitError, fit_clutch
 
     try:
-        return fit_clutch(measured.rows, accuracy, **options)
+        made = fit_clutch(measured.rows, accuracy, **options)
+        return fit_json(made), made.warnings
     except ClutchFitError as error:
         if error.degrees:
             raise WrongInputError("invalid-data", error.summary, _tried(error.degrees, accuracy)) from error
@@ -141,7 +156,7 @@ def _tried(degrees: Iterable[DegreeReport], accuracy: float) -> list[Fault]:
     ]
 
 
-def law_text(coefficients: tuple[float, ...]) -> str:
+def law_text(coefficients: Sequence[float]) -> str:
     """The law as a formula: ``T(u) = 200 u + 20000 u^3`` (N*m, u in rad)."""
     powers = ["", " u", *(f" u^{power}" for power in range(2, len(coefficients)))]
     terms = [(c, power) for c, power in zip(coefficients, powers, strict=False) if c != 0]
@@ -153,31 +168,37 @@ def law_text(coefficients: tuple[float, ...]) -> str:
     return f"T(u) = {text}"
 
 
-def _report(measured: MeasuredData, made: ClutchFit) -> None:
-    degrees = [(r.degree, r.rms, r.max_residual, r.rank, r.condition_number) for r in made.degrees_tried]
+def _report(measured: MeasuredData, made: ClutchFitReport) -> None:
+    fields = ("degree", "rms", "max_residual", "rank")
+    degrees = [(*(dict(tried)[field] for field in fields), _condition(tried)) for tried in made["degrees_tried"]]
     show_table(_("Degrees tried"), [(_(head), numeric) for head, numeric in _DEGREE_COLUMNS], degrees)
-    rows = zip(measured.lines, measured.rows.tolist(), made.residuals, strict=True)
+    rows = zip(measured.lines, measured.rows.tolist(), made["residuals"], strict=True)
     columns = [(_(head), numeric) for head, numeric in _ROW_COLUMNS]
     cells = [(line, angle, torque, residual) for line, (angle, torque), residual in rows]
     show_table(_("Residuals"), columns, cells)
-    law = law_text(made.coefficients)
-    spec = f'"clutch": {{"coefficients": {list(made.coefficients)!r}, "windup_limit": {made.windup_limit!r}}}'
+    law = law_text(made["coefficients"])
+    spec = f'"clutch": {{"coefficients": {made["coefficients"]!r}, "windup_limit": {made["windup_limit"]!r}}}'
     numbers = {
-        "degree": made.degree,
-        "rms": cell_text(made.rms),
-        "residual": cell_text(made.max_residual),
-        "kind": _("monotone") if made.monotone else _("not monotone"),
+        "degree": made["degree"],
+        "rms": cell_text(made["rms"]),
+        "residual": cell_text(made["max_residual"]),
+        "kind": _("monotone") if made["monotone"] else _("not monotone"),
     }
-    eigenvalues = "; ".join(map(cell_text, made.eigenvalues))
+    eigenvalues = "; ".join(map(cell_text, made["eigenvalues"]))
     lines = (
-        law + "   " + _("(N*m, windup u in rad, measured to u = {end} rad)", end=cell_text(made.windup_limit)),
+        law + "   " + _("(N*m, windup u in rad, measured to u = {end} rad)", end=cell_text(made["windup_limit"])),
         _("degree {degree}, RMS {rms} N*m, largest residual {residual} N*m, {kind}", **numbers),
         _(
             "normal matrix: condition number {condition}, eigenvalues {eigenvalues}",
-            condition=cell_text(made.condition_number),
+            condition=cell_text(_condition(made)),
             eigenvalues=eigenvalues,
         ),
         _("for a spec: {text}", text=spec),
     )
     write_text("".join(f"{line}\n" for line in lines))
-    say(*warning_lines((*measured.warnings, *made.warnings)))
+
+
+def _condition(made: ClutchFitReport | FitDegree) -> float:
+    """The condition number, which is null in JSON where it is infinite."""
+    number = made["condition_number"]
+    return math.inf if number is None else number

@@ -1,4 +1,4 @@
-"""Commands that need no service: run, check, presets."""
+"""Commands that need no service: run, check, presets; the last two ask one that is named."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from contextlib import contextmanager
 from dataclasses import asdict
 from datetime import UTC, datetime
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
 from sprag_study.service.cli import completion
-from sprag_study.service.cli.common import wants_json
+from sprag_study.service.cli.common import names_service, wants_json
 from sprag_study.service.cli.configured import read_settings
 from sprag_study.service.cli.console import (
     ExitCode,
@@ -30,7 +30,7 @@ from sprag_study.service.cli.console import (
     wrong_option,
 )
 from sprag_study.service.cli.file_formats import TableFormOption, require_csv, require_report, table_format
-from sprag_study.service.cli.files import output, read_study, to_file
+from sprag_study.service.cli.files import naming_points, output, read_spec, read_study, to_file
 from sprag_study.service.cli.options import (
     Appendix,
     ChunkCases,
@@ -45,12 +45,16 @@ from sprag_study.service.cli.options import (
     SpecFile,
     TableFiles,
 )
+from sprag_study.service.cli.remote import connection
 from sprag_study.service.cli.running import run_parsed
+from sprag_study.service.cli.sources import refuse_here
 from sprag_study.service.languages import N_, _, decimal
+from sprag_study.worker.limits import MAX_BODY_BYTES
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from sprag_study.service.answers.studies import Preview
     from sprag_study.service.formats import Format, Header
     from sprag_study.service.jobs.local import LocalRun
     from sprag_study.service.report import ReportFormat
@@ -77,30 +81,32 @@ def check(
     processes: Processes = None,
     finish_by: FinishBy = None,
 ) -> None:
-    """Check a spec: every fault and warning, then the number of cases, time and size. Nothing is run."""
-    from sprag_study.service.jobs.preview import preview_json
-    from sprag_study.worker.chunking import Chunking
+    """Check a spec: every fault and warning, then the number of cases, time and size. Nothing is run.
 
-    finish = _finish(finish_by)
-    left = None if finish is None else (finish - datetime.now(UTC)).total_seconds()
-    settings = read_settings(database=db, processes=processes)
+    With --server that service checks it, with its database and its processes.
+    """
+    finish, settings = _finish(finish_by), None
+    if names_service():
+        refuse_here(db=db, processes=processes)
+    else:
+        settings = read_settings(database=db, processes=processes)
     try:
-        parsed = read_study(spec, points, partial(_with_start, settings) if db is not None else None, tables)
+        if settings is None:
+            made = _asked(spec, points, tables, finish_by)
+        else:
+            made = _checked(spec, points, tables, settings, finish, stored=db is not None)
     except WrongInputError as failure:
         if not wants_json() or not failure.faults:
             raise
         write_json({"valid": False, **failure.document()})
         raise typer.Exit(ExitCode.WRONG_INPUT) from failure
-    reusable = 0 if db is None else _reusable(settings, parsed)
-    chunking = Chunking(0, settings.pool_processes, settings.chunk_timeout)
-    made = preview_json(parsed, chunking, reusable, left, _START_SECONDS)
     if wants_json():
         write_json({"valid": True, **made})
         return
-    print(_("{file}: valid, {cases} cases", file=spec, cases=parsed.study.cases))
+    print(_("{file}: valid, {cases} cases", file=spec, cases=made["cases"]))
     _show_preview(made)
-    if reusable:
-        write_text(_("{count} of the cases need not be run: the database has them", count=reusable) + "\n")
+    if made["reusable"]:
+        write_text(_("{count} of the cases need not be run: the database has them", count=made["reusable"]) + "\n")
     heads = ((_("axis"), False), (_("unit"), False), (_("values"), True), (_("least"), True), (_("largest"), True))
     rows = [
         (", ".join(axis["paths"]), axis["unit"], axis["values"], axis["least"], axis["largest"])
@@ -112,6 +118,35 @@ def check(
         columns = ((_("parameter"), False), (_("formula, SI"), False))
         show_table(_("Derived parameters"), columns, [*made["derive"].items()])
     say(*warning_lines(made["warnings"], made["warning_codes"]))
+
+
+def _asked(spec: str, points: str | None, tables: list[str] | None, finish_by: str | None) -> Preview:
+    """The preview of the service that is named."""
+    from sprag_study.service.client.queries import query_of
+
+    with naming_points(points), connection() as client:
+        data = read_spec(spec, points, MAX_BODY_BYTES, tables)
+        query = query_of({"finish_by": finish_by})
+        return cast("Preview", client.request("POST", "/studies:preview", json=data, params=query))
+
+
+def _checked(
+    spec: str,
+    points: str | None,
+    tables: list[str] | None,
+    settings: Settings,
+    finish: datetime | None,
+    *,
+    stored: bool,
+) -> Preview:
+    """The preview of this machine; ``stored``: with the cases and studies of the database of the settings."""
+    from sprag_study.service.jobs.preview import preview_json
+    from sprag_study.worker.chunking import Chunking
+
+    left = None if finish is None else (finish - datetime.now(UTC)).total_seconds()
+    parsed = read_study(spec, points, partial(_with_start, settings) if stored else None, tables)
+    chunking = Chunking(0, settings.pool_processes, settings.chunk_timeout)
+    return preview_json(parsed, chunking, _reusable(settings, parsed) if stored else 0, left, _START_SECONDS)
 
 
 def _show_preview(made: Mapping[str, Any]) -> None:
@@ -154,9 +189,12 @@ def presets(
         ),
     ] = None,
 ) -> None:
-    """List the studies that come with the program, or print the spec of one."""
+    """List the studies that come with the program, or print the spec of one; with --server those of that service."""
     from sprag_study.service.presets import ABOUT, preset_names, preset_text
 
+    if names_service():
+        _presets_of_service(name)
+        return
     names = preset_names()
     if name is None:
         if wants_json():
@@ -175,6 +213,20 @@ def presets(
     else:
         write_text(text)
         say(_("{name} is the file {file}", name=name, file=file))  # its ending says what is to be kept
+
+
+def _presets_of_service(name: str | None) -> None:
+    with connection() as client:
+        if name is not None:
+            write_json(client.preset(name)["spec"])
+            return
+        listed = client.presets()
+    if wants_json():
+        about = {item["name"]: {part: item[part] for part in ("shows", "values", "cases")} for item in listed}
+        write_json({"presets": [item["name"] for item in listed], "about": about})
+    else:
+        rows = [(item["name"], _(item["shows"])) for item in listed]
+        show_table("", ((_("preset"), False, True), (_("shows"), False)), rows)
 
 
 def run(

@@ -29,6 +29,13 @@ def is_study(spec: str) -> bool:
     return not (spec == "-" or path.suffix.lower() in (".json", ".toml") or path.is_file() or is_preset(spec))
 
 
+def refuse_here(**given: Any) -> None:
+    """Refuse options of a command that runs here where a service answers; WrongInputError."""
+    for name, value in given.items():
+        if value is not None:
+            raise wrong_option(f"--{name}", "not-used", N_("belongs to this machine, and --server names a service"))
+
+
 def refuse_local(**given: Any) -> None:
     """Refuse what only a spec has; WrongInputError."""
     options = {"every": "--all", "points_file": "--points", "tables": "--file"}

@@ -7,7 +7,7 @@ import os
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from sprag_study.service.cli.common import CURRENT, wants_json
+from sprag_study.service.cli.common import names_service, wants_json
 from sprag_study.service.cli.configured import read_settings
 from sprag_study.service.cli.console import WrongInputError, say
 from sprag_study.service.languages import _
@@ -43,7 +43,7 @@ def asks_service(db: str | None) -> bool:
     It does with ``--server``, and on a machine without a database where ``SPRAG_SERVER`` or a login names a service;
     never with ``db`` (the option).
     """
-    if db is not None or CURRENT.get().server:
+    if db is not None or names_service():
         return db is None
     return bool(os.environ.get("SPRAG_SERVER") or "server" in profile()) and not _is_here()
 

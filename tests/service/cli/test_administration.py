@@ -13,9 +13,11 @@ import pytest
 
 from sprag_study.service import client as clients
 from sprag_study.service.storage.people.audit import AuditFilter
+from sprag_study.service.storage.readiness import Readiness
 from tests.conftest import Finished
 from tests.service.conftest import PortalTransport
 from tests.service.http.people import Office
+from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
     from anyio.from_thread import BlockingPortal
@@ -107,6 +109,40 @@ def test_what_the_service_refuses_is_said_as_of_the_database(asked: Run, sprag: 
     assert sprag(*designer, "admin", "user", "list").code == 3
     last = asked("admin", "user", "remove", "ada")
     assert (last.code, "last administrator" in last.err) == (2, True)
+
+
+def test_a_named_service_answers_what_a_command_also_finds_out_here(
+    asked: Run, sprag: Run, office: Office, tmp_path: Path
+) -> None:
+    spec, data = tmp_path / "spec.json", tmp_path / "clutch.csv"
+    spec.write_text(json.dumps(SPEC))
+    data.write_text("angle [deg];torque [N*m]\n0;0\n1;3.5\n2;7.2\n3;11.5\n")
+    own = ("estimated_seconds", "estimated_bytes", "reusable")  # of the machine and its database
+    for command in ("check SPEC", "fit DATA --accuracy 0.1", "presets"):
+        words = [{"SPEC": spec, "DATA": data}.get(word, word) for word in command.split()]
+        remote, here = asked(*words, "--json"), sprag(*words, "--json")
+        told, kept = json.loads(remote.out), json.loads(here.out)
+        for answer in (told, kept):
+            for name in own:
+                answer.pop(name, None)
+        assert told == kept, (command, remote.err)
+        if command != "check SPEC":
+            assert asked(*words).out == sprag(*words).out
+    assert json.loads(asked("presets", "one_pendulum").out)["model"] == "vibration-drive"
+    spec.write_text(json.dumps({**SPEC, "axes": 7}))
+    wrong = asked("check", spec, "--json")
+    assert (wrong.code, json.loads(wrong.out)["valid"]) == (2, False)
+    assert "--db" in asked("check", spec, "--db", "x").err
+
+
+def test_health_and_metrics_of_a_service(asked: Run, office: Office, monkeypatch: pytest.MonkeyPatch) -> None:
+    well = asked("admin", "health")
+    assert (well.code, "can be submitted" in well.out) == (0, True)
+    assert json.loads(asked("admin", "health", "--json").out)["status"] == "ok"
+    assert asked("admin", "metrics").out.startswith("# HELP")
+    monkeypatch.setattr(Readiness, "problems", lambda _: ("The worker has ended.",))
+    ill = asked("admin", "health")
+    assert (ill.code, "The worker has ended." in ill.err) == (3, True)
 
 
 def test_the_service_is_asked_where_one_is_chosen(

@@ -1,4 +1,4 @@
-"""Every operation of the HTTP interface has a method of both clients, and a command or a reason to have none."""
+"""Every operation of the HTTP interface has a method of both clients and a command."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from sprag_study.service.client import AsyncClient, AsyncStudy, Client, ServiceE
 from tests.service.client import generate
 from tests.service.conftest import Service
 
-ID, SCHEDULE = "st_0123456789abcdef", "sc_0123456789abcdef"
+ID, BUSY, SCHEDULE = "st_0123456789abcdef", "st_fedcba9876543210", "sc_0123456789abcdef"
 STUDY = {
     "id": ID, "name": "", "model": "vibration-drive", "cases": 1, "state": "finished", "time_over": False,
     "finish_by": None,
@@ -33,11 +33,11 @@ USER = {
 LOAD, SPEED = "shaft.load", "shaft.speed.mean"
 
 Call = Callable[[Any, Any], Any]
-#: Of each operation: what both clients do for it (client, study), and the command, or after "-" why there is none.
+#: Of each operation: what both clients do for it (client, study), and the command.
 OPERATIONS: dict[str, tuple[Call, str]] = {
     "create_study": (lambda c, _: c.submit({}), "submit SPEC"),
     "list_studies": (lambda c, _: c.studies("queued"), "list"),
-    "preview_study": (lambda c, _: c.preview({}), "- `sprag check` asks no service"),
+    "preview_study": (lambda c, _: c.preview({}), "check SPEC --server http://sprag"),
     "get_study": (lambda _, s: s.detail(), "show ID"),
     "change_study": (lambda _, s: s.change(name="x"), "study edit ID --name x"),
     "delete_study": (lambda _, s: s.delete(), "study delete ID --yes"),
@@ -52,7 +52,7 @@ OPERATIONS: dict[str, tuple[Call, str]] = {
     "narrow_study": (lambda _, s: s.narrow(), "study narrow ID"),
     "select_cases": (lambda _, s: s.select("c > 0"), "study select ID"),
     "prioritize_study": (lambda _, s: s.prioritize(3), "study prioritize ID 3"),
-    "get_events": (lambda _, s: s.events(), "- `sprag study watch` listens to it while a study runs"),
+    "get_events": (lambda _, s: s.events(), "study watch BUSY"),
     "get_curves": (lambda _, s: s.curves(LOAD, SPEED), "show ID curves"),
     "get_map": (lambda _, s: s.map(LOAD, "b", SPEED), "show ID map --x a --y b --z c"),
     "get_results": (lambda _, s: s.table(), "export ID"),
@@ -75,7 +75,7 @@ OPERATIONS: dict[str, tuple[Call, str]] = {
     "get_strobes": (lambda _, s: s.strobes(3), "show ID strobes --case 3"),
     "get_transient": (lambda _, s: s.transient(3, "run-up"), "show ID transient --case 3 --kind run-up"),
     "get_basin": (lambda _, s: s.basin(3), "show ID basin --case 3"),
-    "fit_clutch": (lambda c, _: c.fit_clutch([(0, 0)], 0.1), "- `sprag fit` asks no service"),
+    "fit_clutch": (lambda c, _: c.fit_clutch([(0, 0)], 0.1), "fit DATA --accuracy 1 --server http://sprag"),
     "create_schedule": (lambda c, _: c.create_schedule({}, cron="@daily"), "schedule add SPEC --cron @daily"),
     "list_schedules": (lambda c, _: c.schedules(), "schedule list"),
     "get_night": (lambda c, _: c.night(12), "schedule night --hours 12"),
@@ -91,8 +91,8 @@ OPERATIONS: dict[str, tuple[Call, str]] = {
     "delete_view": (lambda c, _: c.delete_view("vw_1"), "view delete ID"),
     "list_models": (lambda c, _: c.models(), "models"),
     "get_model": (lambda c, _: c.model("machine-shaft"), "models machine-shaft"),
-    "list_presets": (lambda c, _: c.presets(), "- `sprag presets` asks no service"),
-    "get_preset": (lambda c, _: c.preset("feeder"), "- `sprag presets` asks no service"),
+    "list_presets": (lambda c, _: c.presets(), "presets --server http://sprag"),
+    "get_preset": (lambda c, _: c.preset("feeder"), "presets feeder --server http://sprag"),
     "list_workers": (lambda c, _: c.workers(), "admin workers"),
     "get_me": (lambda c, _: c.me(), "login http://localhost --token x"),
     "list_users": (lambda c, _: c.users(), "admin user list --server http://sprag"),
@@ -103,14 +103,14 @@ OPERATIONS: dict[str, tuple[Call, str]] = {
         "admin user hand-over dora --to emil --server http://sprag",
     ),
     "get_audit": (lambda c, _: c.audit(), "admin audit --server http://sprag"),
-    "livez": (lambda c, _: c.live(), "- for the supervisor of the service"),
-    "readyz": (lambda c, _: c.ready(), "- for load balancers; `sprag admin doctor` looks for causes"),
-    "metrics": (lambda c, _: c.metrics(), "- for Prometheus"),
+    "livez": (lambda c, _: c.live(), "admin health"),
+    "readyz": (lambda c, _: c.ready(), "admin health"),
+    "metrics": (lambda c, _: c.metrics(), "admin metrics"),
 }
 
 
 class Recorder:
-    """A service that knows one study and two users, refuses everything else, and remembers what it was asked."""
+    """A service that knows studies, of which one runs, and users, refuses the rest, and remembers what it was asked."""
 
     def __init__(self) -> None:
         self.asked: list[tuple[str, str]] = []
@@ -120,6 +120,11 @@ class Recorder:
         self.asked.append((request.method.lower(), request.url.path))
         if self.asked[-1] == ("get", f"/api/v1/studies/{ID}"):
             return httpx.Response(200, json=STUDY)
+        if self.asked[-1] == ("get", f"/api/v1/studies/{BUSY}"):
+            listened = any(path.endswith("/events") for _, path in self.asked)
+            return httpx.Response(200, json={**STUDY, "id": BUSY, "state": "finished" if listened else "running"})
+        if self.asked[-1] == ("get", "/livez"):
+            return httpx.Response(200, json={"status": "ok"})
         if self.asked[-1] == ("get", "/api/v1/users"):
             return httpx.Response(200, json={"users": [{**USER, "name": name} for name in ("dora", "emil")]})
         return httpx.Response(418, json={"title": "refused"})
@@ -141,7 +146,6 @@ def operations(service: Service) -> dict[str, tuple[str, str]]:
 
 def test_every_operation_is_in_the_list(operations: dict[str, tuple[str, str]]) -> None:
     assert set(OPERATIONS) == set(operations)
-    assert all(command.startswith("- ") == (command[0] == "-") and command for _, command in OPERATIONS.values())
 
 
 def test_the_client_has_a_method_for_each(operations: dict[str, tuple[str, str]]) -> None:
@@ -167,7 +171,7 @@ def test_so_has_the_asynchronous_one(operations: dict[str, tuple[str, str]]) -> 
         assert recorder.reached(*operations[name]), (name, recorder.asked)
 
 
-def test_and_a_command_unless_a_reason_is_given(
+def test_and_a_command(
     operations: dict[str, tuple[str, str]],
     sprag: Callable[..., Any],
     tmp_path: Path,
@@ -175,11 +179,11 @@ def test_and_a_command_unless_a_reason_is_given(
 ) -> None:
     spec = tmp_path / "spec.json"
     spec.write_text(json.dumps({"sprag": 1}))
-    words = {"SPEC": str(spec), "ID": ID, "SCHEDULE": SCHEDULE}
+    data = tmp_path / "clutch.csv"
+    data.write_text("0.1;20\n0.2;40\n")
+    words = {"SPEC": str(spec), "DATA": str(data), "ID": ID, "BUSY": BUSY, "SCHEDULE": SCHEDULE}
     genuine = clients.Client
     for name, (_, command) in OPERATIONS.items():
-        if command.startswith("-"):
-            continue
         recorder = Recorder()
         monkeypatch.setattr(clients, "Client", partial(genuine, transport=httpx.MockTransport(recorder)))
         done = sprag(*(words.get(word, word) for word in command.split()))
