@@ -349,8 +349,10 @@ def _largest(values: _Values, grid: Floats) -> float:
     last = len(_PLACES) - 1
     at, best = np.argmax(grid, axis=1), np.max(grid, axis=1)
     sides = np.stack([np.maximum(at - 1, 0), np.minimum(at + 1, last)])
-    # Between the places a smooth quantity rises above the best of them by less than it falls off to the places beside.
-    lowest = np.min(grid[np.arange(len(grid)), sides], axis=0)
+    # Between the places a smooth quantity rises above the best of them by less than it falls off to the places around.
+    # At an edge the place beside may be as good, with the peak between both: so the next one counts too.
+    around = np.stack([np.maximum(at - 2, 0), np.minimum(at + 2, last)])
+    lowest = np.min(grid[np.arange(len(grid)), around], axis=0)
     steps = np.flatnonzero(best + (best - lowest) >= np.max(best))
     low, high = _PLACES[sides[0][steps]], _PLACES[sides[1][steps]]
     largest = float(np.max(best))

@@ -226,3 +226,11 @@ def test_an_independent_integrator_agrees(machines: Callable[..., list[Columns]]
     (columns,) = machines(1 + number % 2, 700 + number, 1)
     if not compare_forces(columns):
         pytest.skip("too sensitive to conclude anything")
+
+
+@pytest.mark.parametrize(("machines", "pendulums", "seed"), [(random_machines, 2, 20_170), (damped, 1, 20_265)])
+def test_a_peak_just_within_the_edge_of_a_step_is_not_missed(
+    machines: Callable[..., list[Columns]], pendulums: int, seed: int
+) -> None:
+    (columns,) = machines(pendulums, seed, 1)
+    assert compare_forces(columns)
