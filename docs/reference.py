@@ -17,7 +17,7 @@ from fastapi.routing import APIRoute
 
 from docs import manual
 from sprag_study.engine.formulas.expressions import MAX_LENGTH
-from sprag_study.engine.vibration_drive.engagements import MAX_PERIODS
+from sprag_study.engine.vibration_drive.examined import MAX_PERIODS
 from sprag_study.engine.vibration_drive.force_results import force_infos
 from sprag_study.service.cli.app import command_line
 from sprag_study.service.cli.console import ExitCode

@@ -126,6 +126,12 @@ class Engagement:
         Work in J that the clutch does on the shaft, and that its pendulum does on the clutch.
     complete : bool
         Whether it begins and ends within the examined part of the run; otherwise only its part within is given.
+    impact_speed : float
+        Relative speed of pendulum and shaft at its start, in rad/s; NaN where it begins before the examined part.
+    torque_rate_max : float
+        Largest rate of the torque in magnitude between its jumps, in N*m/s.
+    windup_max : float
+        Largest windup, in rad.
     """
 
     clutch: int
@@ -136,6 +142,9 @@ class Engagement:
     work_shaft: float
     work_pendulum: float
     complete: bool
+    impact_speed: float
+    torque_rate_max: float
+    windup_max: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,4 +218,97 @@ class Forces:
     infos: tuple[ResultInfo, ...]
     results: dict[str, float]
     motion: Trajectory
+    ending: Ending
+
+
+@dataclass(frozen=True, slots=True)
+class ClutchDuty:
+    """What one clutch has to bear.
+
+    Attributes
+    ----------
+    clutch : int
+        Number of its pendulum, from 0.
+    engagements_per_hour : float
+    torque_max : float
+        Largest torque that it transmits, in N*m.
+    torque_rate_max : float
+        Largest rate of that torque in magnitude between its jumps, in N*m/s.
+    torque_jump_max : float
+        Largest jump of that torque, in N*m.
+    impact_speed_max : float
+        Largest relative speed of pendulum and shaft at the start of an engagement, in rad/s.
+    overrunning_speed_max : float
+        Largest relative speed at which it overruns, in rad/s.
+    windup_min, windup_max : float
+        Range of its windup while it transmits torque, in rad.
+    slip_work_per_hour : float
+        Work that its damping turns into heat in an hour, in J.
+    cycles_per_hour : float
+        Cycles of its torque by rainflow counting.
+    torque_equivalent : float
+        Torque that, reached from zero and left again once in each engagement, does the same damage, in N*m. NaN without
+        an exponent of the Wöhler curve, and for a clutch that does not engage.
+    """
+
+    clutch: int
+    engagements_per_hour: float
+    torque_max: float
+    torque_rate_max: float
+    torque_jump_max: float
+    impact_speed_max: float
+    overrunning_speed_max: float
+    windup_min: float
+    windup_max: float
+    slip_work_per_hour: float
+    cycles_per_hour: float
+    torque_equivalent: float
+
+
+@dataclass(frozen=True, slots=True)
+class TorqueCycles:
+    """Cycles of the torque of one clutch that are alike.
+
+    Attributes
+    ----------
+    clutch : int
+        Number of its pendulum, from 0.
+    range, mean : float
+        Difference between peak and valley, and the mean of both, in N*m.
+    count : float
+        Cycles in the examined part; a half cycle counts as 0.5.
+    per_hour : float
+        Cycles per hour.
+    """
+
+    clutch: int
+    range: float
+    mean: float
+    count: float
+    per_hour: float
+
+
+@dataclass(frozen=True, slots=True)
+class Duty:
+    """What the clutches of one case have to bear.
+
+    Attributes
+    ----------
+    start, end : float
+        The examined part of the run, in s.
+    regime : str
+        Name of the settled motion's regime; "" for a run of a given time.
+    rows : tuple of ClutchDuty
+        One for each clutch; () where none transmits torque in the limit of a vanishing load.
+    cycles : tuple of TorqueCycles
+        Of each clutch, the largest ranges first.
+    ending : Ending
+        Where it is not ok there are no rows and no cycles.
+    """
+
+    start: float
+    end: float
+    regime: str
+    rows: tuple[ClutchDuty, ...]
+    cycles: tuple[TorqueCycles, ...]
     ending: Ending

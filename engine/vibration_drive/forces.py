@@ -18,7 +18,7 @@ from sprag_study.engine.outcome import Forces, Trajectory
 from sprag_study.engine.quadrature import gauss
 from sprag_study.engine.run import Run, SettledRun
 from sprag_study.engine.vibration_drive.cases import case_matrix, default_of, scalars, with_lengths
-from sprag_study.engine.vibration_drive.engagements import MAX_PERIODS, read_steps
+from sprag_study.engine.vibration_drive.examined import MAX_PERIODS, read_steps
 from sprag_study.engine.vibration_drive.force_results import Bearing, force_infos
 from sprag_study.engine.vibration_drive.formulas import base_series, drive, free_acceleration
 from sprag_study.engine.vibration_drive.integration import integrate

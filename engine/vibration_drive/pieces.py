@@ -1,16 +1,18 @@
 """The steps of one case: their starts, lengths, and polynomials of speeds and torques."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sprag_study.engine.compile.jit import part
 from sprag_study.engine.vibration_drive import states as ev
+from sprag_study.engine.vibration_drive.automaton import Clutch
 from sprag_study.engine.vibration_drive.layout import Layout
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 #: Columns of a step: whole periods and part of the period at its start, its length in s, then the series of the shaft's
 #: speed; of each pendulum its clutch's state and number of engagements, then the series of its speed and its torque.
@@ -18,6 +20,8 @@ WHOLE, FRACTION, LENGTH = range(3)
 HEAD = 3
 #: Points at which a polynomial is compared before its largest value is refined, and golden sections of that.
 _POINTS, _SECTIONS = 17, 40
+#: Halvings of the part of a step in which a polynomial turns.
+_HALVINGS = 40
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 
 
@@ -73,6 +77,10 @@ class Pieces:
         State of each clutch, and how often it has engaged.
     speeds, torques : array, shape (steps, n, order + 1)
         Series of the pendulums' speeds and their clutches' torques.
+    begins : array, shape (steps, n)
+        Whether an engagement begins with the step; one that begins before the first step begins with that.
+    windups : array, shape (steps, n)
+        Windup of each clutch at the start of the step, in rad; 0 where it is not wound up.
     """
 
     whole: Ints
@@ -84,25 +92,66 @@ class Pieces:
     counts: Floats
     speeds: Floats
     torques: Floats
+    begins: Flags
+    windups: Floats
 
     @classmethod
     def read(cls, lay: Layout, rows: Floats, period: float) -> "Pieces":
-        """The steps in the rows that ``keep`` has filled; ``period`` is the excitation's, in s."""
+        """The steps in the rows that ``keep`` has filled; ``period`` is the excitation's, in s.
+
+        Clutches that are wound up at the first step count from there: ``wound`` adds their windups.
+        """
         rows = rows[~np.isnan(rows[:, WHOLE])]
         terms = lay.order + 1
         pendulums = rows[:, HEAD + terms :].reshape(len(rows), lay.n, 2 + 2 * terms)
-        start = rows[:, WHOLE] + rows[:, FRACTION]
+        start, length, speed = rows[:, WHOLE] + rows[:, FRACTION], rows[:, LENGTH], rows[:, HEAD : HEAD + terms]
+        states, counts = pendulums[:, :, 0].astype(np.int64), pendulums[:, :, 1]
+        speeds, torques = pendulums[:, :, 2 : 2 + terms], pendulums[:, :, 2 + terms :]
+        begins = states >= Clutch.ENGAGED
+        # A literal reset begins a new one.
+        begins[1:] &= (states[:-1] < Clutch.ENGAGED) | (counts[1:] > counts[:-1])
+        gained = np.column_stack([integrals(speeds[:, i] - speed, length) for i in range(lay.n)])
         return cls(
-            rows[:, WHOLE].astype(np.int64), start, start + rows[:, LENGTH] / period, rows[:, LENGTH],
-            rows[:, HEAD : HEAD + terms], pendulums[:, :, 0].astype(np.int64), pendulums[:, :, 1],
-            pendulums[:, :, 2 : 2 + terms], pendulums[:, :, 2 + terms :],
+            rows[:, WHOLE].astype(np.int64), start, start + length / period, length, speed, states, counts, speeds,
+            torques, begins, _windups(states, begins, gained),
         )  # fmt: skip
+
+    def wound(self, windups: ArrayLike) -> "Pieces":
+        """The steps, with the clutches' windups (rad) at the start of the first one, shape (n,)."""
+        before = np.logical_and.accumulate(_is_wound(self.states) & ~_starts(self.states, self.begins), axis=0)
+        return replace(self, windups=self.windups + np.where(before, windups, 0.0))
+
+    def windup(self, clutch: int) -> Floats:
+        """Series of the windup of a clutch (rad), shape (steps, order + 2)."""
+        return turned(self.speeds[:, clutch] - self.speed, self.length, self.windups[:, clutch])
 
     def between(self, start: float, end: float) -> "Pieces":
         """The steps within a time (in excitation periods) at whose ends steps end too."""
         middle = 0.5 * (self.start + self.end)
         kept = (middle > start) & (middle < end)
         return Pieces(*(getattr(self, name)[kept] for name in Pieces.__slots__))
+
+
+def _is_wound(states: Ints) -> Flags:
+    return np.asarray((states == Clutch.ENGAGED) | (states == Clutch.BEYOND))
+
+
+def _starts(states: Ints, begins: Flags) -> Flags:
+    """Where windups count from 0: at the start of every engagement but those of the first step, and where clutches are
+    not wound up.
+    """
+    later = np.arange(len(states))[:, np.newaxis] > 0
+    return (begins & later) | ~_is_wound(states)
+
+
+def _windups(states: Ints, begins: Flags, gained: Floats) -> Floats:
+    """Windups at the starts of steps, from the relative turn ``gained`` in each."""
+    gained = np.where(_is_wound(states), gained, 0.0)
+    total = np.cumsum(gained, axis=0) - gained
+    rows = np.arange(len(states))[:, np.newaxis]
+    since = np.maximum.accumulate(np.where(_starts(states, begins), rows, 0), axis=0)
+    windups: Floats = total - np.take_along_axis(total, since, axis=0)
+    return windups
 
 
 def integrals(series: Floats, length: Floats) -> Floats:
@@ -134,6 +183,43 @@ def largest(series: Floats) -> Floats:
     ends = np.maximum(_at(series, np.zeros(len(series))), _at(series, np.ones(len(series))))
     best: Floats = np.maximum(ends, _at(series, 0.5 * (low + high)))
     return best
+
+
+def turned(series: Floats, length: Floats, start: Floats) -> Floats:
+    """Integral of each series as a series, from the value ``start`` on; one term longer."""
+    terms = series * (length[:, np.newaxis] / np.arange(1, series.shape[1] + 1))
+    return np.column_stack([start, terms])
+
+
+def rates(series: Floats, length: Floats) -> Floats:
+    """Derivative of each series with respect to time (s) as a series."""
+    out: Floats = series[:, 1:] * np.arange(1, series.shape[1]) / length[:, np.newaxis]
+    return out
+
+
+def extremes(series: Floats) -> tuple[Ints, Floats]:
+    """The values of each series at the start and the end of its step and at its turning points between, in order.
+
+    Returns
+    -------
+    rows : array, shape (values,)
+        Of the series.
+    values : array, shape (values,)
+    """
+    grid = np.linspace(0.0, 1.0, _POINTS)
+    slope = series[:, 1:] * np.arange(1, series.shape[1])
+    signs = np.sign(slope @ (grid ** np.arange(slope.shape[1])[:, np.newaxis]))
+    rows, points = np.nonzero(signs[:, :-1] * signs[:, 1:] < 0.0)
+    low, high, falls = grid[points], grid[points + 1], signs[rows, points]
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        before = np.sign(_at(slope[rows], middle)) == falls
+        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    every = np.arange(len(series))
+    at = np.concatenate([np.zeros(len(series)), 0.5 * (low + high), np.ones(len(series))])
+    all_rows = np.concatenate([every, rows, every])
+    order = np.lexsort((at, all_rows))
+    return all_rows[order], _at(series[all_rows], at)[order]
 
 
 def _at(series: Floats, x: Floats) -> Floats:

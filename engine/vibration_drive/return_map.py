@@ -15,7 +15,7 @@ from sprag_study.engine.run import Run
 from sprag_study.engine.vibration_drive.automaton import Clutch
 from sprag_study.engine.vibration_drive.cases import case_matrix, with_lengths
 from sprag_study.engine.vibration_drive.coordinates import to_points, to_strobes
-from sprag_study.engine.vibration_drive.engagements import read_steps
+from sprag_study.engine.vibration_drive.examined import read_steps
 from sprag_study.engine.vibration_drive.integration import integrate
 from sprag_study.engine.vibration_drive.kernel import Kernel
 from sprag_study.engine.vibration_drive.layout import OUT_ENDING

@@ -317,6 +317,12 @@ class EngagementRow(TypedDict):
     work_shaft: Annotated[float, Doc("work that the clutch does on the shaft, J")]
     work_pendulum: Annotated[float, Doc("work that the pendulum does on the clutch, J")]
     complete: Annotated[bool, Doc("false where it begins before or continues after the reported part")]
+    impact_speed: Annotated[
+        float | None,
+        Doc("relative speed of pendulum and shaft at its start, rad/s; null where it begins before the reported part"),
+    ]
+    torque_rate_max: Annotated[float, Doc("largest rate of the torque in magnitude between its jumps, N*m/s")]
+    windup_max: Annotated[float, Doc("largest windup, rad")]
 
 
 class PeriodRow(TypedDict):
@@ -338,6 +344,55 @@ class EngagementTables(TypedDict):
     regime: Annotated[str | None, Doc("regime of the settled motion; null for a run of a given time")]
     engagements: list[EngagementRow]
     periods: Annotated[list[PeriodRow], Doc("whole excitation periods")]
+    ending: str
+
+
+class ClutchDutyRow(TypedDict):
+    """What one clutch has to bear."""
+
+    clutch: Annotated[int, Doc("number of its pendulum, from 0")]
+    engagements_per_hour: float
+    torque_max: Annotated[float, Doc("largest torque that it transmits, N*m")]
+    torque_rate_max: Annotated[float, Doc("largest rate of that torque in magnitude between its jumps, N*m/s")]
+    torque_jump_max: Annotated[float, Doc("largest jump of that torque, N*m")]
+    impact_speed_max: Annotated[
+        float, Doc("largest relative speed of pendulum and shaft at the start of an engagement, rad/s")
+    ]
+    overrunning_speed_max: Annotated[float, Doc("largest relative speed at which it overruns, rad/s")]
+    windup_min: Annotated[float, Doc("smallest windup while it transmits torque, rad")]
+    windup_max: Annotated[float, Doc("largest windup, rad")]
+    slip_work_per_hour: Annotated[float, Doc("work that its damping turns into heat in an hour, J")]
+    cycles_per_hour: Annotated[float, Doc("cycles of its torque by rainflow counting")]
+    torque_equivalent: Annotated[
+        float | None,
+        Doc(
+            "torque that, reached from zero once in each engagement, does the same damage, N*m; null without an "
+            "`exponent`, and where it does not engage"
+        ),
+    ]
+
+
+class TorqueCyclesRow(TypedDict):
+    """Cycles of the torque of one clutch that are alike."""
+
+    clutch: Annotated[int, Doc("number of its pendulum, from 0")]
+    range: Annotated[float, Doc("difference between peak and valley, N*m")]
+    mean: Annotated[float, Doc("mean of peak and valley, N*m")]
+    count: Annotated[float, Doc("cycles in the reported part; a half cycle counts as 0.5")]
+    per_hour: Annotated[float, Doc("cycles per hour")]
+
+
+class DutyTables(TypedDict):
+    """What the clutches of one case have to bear, and the cycles of their torques."""
+
+    case: int
+    parameters: dict[str, Value]
+    start: Annotated[float, Doc("start of the reported part, s")]
+    end: Annotated[float, Doc("its end, s: after one turn of a periodic motion, or at the end of the window")]
+    regime: Annotated[str | None, Doc("regime of the settled motion; null for a run of a given time")]
+    exponent: Annotated[float | None, Doc("exponent of the Wöhler curve")]
+    clutches: list[ClutchDutyRow]
+    cycles: Annotated[list[TorqueCyclesRow], Doc("of each clutch, the largest ranges first")]
     ending: str
 
 

@@ -1,4 +1,4 @@
-"""Motions of one case as tables: instantaneous values, engagements. pandas is loaded on first use."""
+"""Motions of one case as tables: instantaneous values, engagements, duty of clutches. pandas is loaded on first use."""
 
 from __future__ import annotations
 
@@ -11,12 +11,22 @@ from sprag_study.service.extras import naming_extra
 if TYPE_CHECKING:
     import pandas as pd
 
-    from sprag_study.service.answers.results import AngleTable, EngagementTables, Trajectory
+    from sprag_study.service.answers.results import AngleTable, DutyTables, EngagementTables, Trajectory
     from sprag_study.service.client.sketch import Line
 
 #: SI units of the columns of engagements and of periods.
-_ENGAGEMENT_UNITS: Final = {"start": "s", "end": "s", "torque_max": "N*m", "work_shaft": "J", "work_pendulum": "J"}
+_ENGAGEMENT_UNITS: Final = {
+    "start": "s", "end": "s", "torque_max": "N*m", "work_shaft": "J", "work_pendulum": "J", "impact_speed": "rad/s",
+    "torque_rate_max": "N*m/s", "windup_max": "rad",
+}  # fmt: skip
 _PERIOD_UNITS: Final = {"start": "s", "speed_mean": "rad/s", "speed_max": "rad/s", "torque_mean": "N*m"}
+#: Those of what clutches have to bear, and of the cycles of their torques.
+_DUTY_UNITS: Final = {
+    "torque_max": "N*m", "torque_rate_max": "N*m/s", "torque_jump_max": "N*m", "impact_speed_max": "rad/s",
+    "overrunning_speed_max": "rad/s", "windup_min": "rad", "windup_max": "rad", "slip_work_per_hour": "J",
+    "torque_equivalent": "N*m",
+}  # fmt: skip
+_CYCLE_UNITS: Final = {"range": "N*m", "mean": "N*m"}
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -63,17 +73,38 @@ class Engagements:
         return f"Engagements(case {self.data['case']}: {len(self.data['engagements'])} engagements)"
 
     def to_pandas(self) -> pd.DataFrame:
-        """A row for each engagement: clutch, start, end, order, torque, work; ``attrs`` has units and the ending."""
-        return self._table("engagements", _ENGAGEMENT_UNITS)
+        """A row for each engagement: clutch, start, end, order, torque, work, impact, windup; ``attrs`` has units and
+        the ending.
+        """
+        return _frame(self.data, "engagements", _ENGAGEMENT_UNITS)
 
     def periods(self) -> pd.DataFrame:
         """A row for each whole excitation period: start, speeds of the shaft, mean torque of all clutches."""
-        return self._table("periods", _PERIOD_UNITS)
+        return _frame(self.data, "periods", _PERIOD_UNITS)
 
-    def _table(self, part: str, units: dict[str, str]) -> pd.DataFrame:
-        with naming_extra("a table of engagements", "tables"):
-            import pandas as pd
 
-        table = pd.DataFrame(cast("dict[str, Any]", self.data)[part])
-        table.attrs.update(units=dict(units), ending=self.data["ending"], case=self.data["case"])
-        return table
+@dataclass(frozen=True, slots=True, repr=False)
+class Duty:
+    """What the clutches of one case have to bear; ``data`` is the answer of the service. SI units."""
+
+    data: DutyTables
+
+    def __repr__(self) -> str:
+        return f"Duty(case {self.data['case']}: {len(self.data['clutches'])} clutches)"
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A row for each clutch: torques, impacts, overrunning, windup, slip; ``attrs`` has units and the ending."""
+        return _frame(self.data, "clutches", _DUTY_UNITS)
+
+    def cycles(self) -> pd.DataFrame:
+        """A row for each kind of cycle of a clutch's torque: its range, mean and count, the largest first."""
+        return _frame(self.data, "cycles", _CYCLE_UNITS)
+
+
+def _frame(data: EngagementTables | DutyTables, part: str, units: dict[str, str]) -> pd.DataFrame:
+    with naming_extra("a table of clutches", "tables"):
+        import pandas as pd
+
+    table = pd.DataFrame(cast("dict[str, Any]", data)[part])
+    table.attrs.update(units=dict(units), ending=data["ending"], case=data["case"])
+    return table

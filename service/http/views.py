@@ -126,7 +126,7 @@ def case_detail(store: Store, study_id: str, study: Study, case: int) -> CaseDet
     if has_transients(study):
         links["transient"] = f"{own}/transient"
     if models.has_clutches(study):
-        links["engagements"] = f"{own}/engagements"
+        links |= {name: f"{own}/{name}" for name in ("engagements", "duty")}
     if has_reactions(study):
         links["forces"] = f"{own}/forces"
     if models.has_strobes(study):

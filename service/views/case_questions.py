@@ -104,6 +104,31 @@ class EngagementsQuestion:
 
 
 @dataclass(frozen=True, slots=True)
+class DutyQuestion:
+    """With which exponent of the Wöhler curve, and which table."""
+
+    exponent: Annotated[
+        str | None,
+        Setting(
+            "exponent of the Wöhler curve, for the equivalent torque",
+            examples=("5",),
+            metavar="NUMBER",
+            label=N_("Exponent of the Wöhler curve"),
+        ),
+    ] = None
+    table: Annotated[
+        str,
+        Setting(
+            "the table of a CSV file; JSON has both",
+            choices=("clutches", "cycles"),
+            metavar="TABLE",
+            of_files=True,
+            words=(N_("clutches"), N_("cycles")),
+        ),
+    ] = "clutches"
+
+
+@dataclass(frozen=True, slots=True)
 class ForcesQuestion:
     """What is known of the shaft and of its bearings, and at how many times."""
 
@@ -351,6 +376,13 @@ ENGAGEMENTS: Final = ViewInfo(
     pictures=False,
     title=N_("When the clutches engage"),
 )
+DUTY: Final = ViewInfo(
+    "duty",
+    DutyQuestion,
+    "Compute what the clutches of one case have to bear: cycles of torque, impacts, overrunning, slip.",
+    pictures=False,
+    title=N_("What the clutches have to bear"),
+)
 FORCES: Final = ViewInfo(
     "forces",
     ForcesQuestion,
@@ -436,4 +468,4 @@ TRANSIENT: Final = ViewInfo(
     ),
 )
 #: Every view of a case, in the order of the API.
-CASE_VIEWS: Final = (TRAJECTORY, ENGAGEMENTS, FORCES, STROBES, BRANCH, DIAGRAM, SECTION, BASIN, TRANSIENT)
+CASE_VIEWS: Final = (TRAJECTORY, ENGAGEMENTS, DUTY, FORCES, STROBES, BRANCH, DIAGRAM, SECTION, BASIN, TRANSIENT)

@@ -7,6 +7,7 @@ from typing import Any, Final
 from sprag_study.service.views.basin import BasinView
 from sprag_study.service.views.branch import BranchView
 from sprag_study.service.views.case_view import CaseView
+from sprag_study.service.views.duty import DutyView
 from sprag_study.service.views.engagements import EngagementsView
 from sprag_study.service.views.forces import ForcesView
 from sprag_study.service.views.portrait import StrobesView
@@ -18,7 +19,8 @@ from sprag_study.service.views.transient import TransientView
 CASE_VIEWS: Final[dict[str, CaseView[Any, Any, Any]]] = {
     view.about.name: view
     for view in (
-        TrajectoryView(), EngagementsView(), ForcesView(), StrobesView(), BranchView(), DiagramView(), SectionView(),
+        TrajectoryView(), EngagementsView(), DutyView(), ForcesView(), StrobesView(), BranchView(), DiagramView(),
+        SectionView(),
         BasinView(), TransientView(),
     )
 }  # fmt: skip

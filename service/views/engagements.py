@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Final
 
 from sprag_study.sentences import Amount
@@ -18,6 +19,8 @@ from sprag_study.worker import models
 from sprag_study.worker.models import Engagements
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
     from sprag_study.service.views.shown import Cell
     from sprag_study.worker.models import Engagement
     from sprag_study.worker.study import Study
@@ -27,38 +30,58 @@ _SHOWN: Final = 100
 _COLUMNS: Final = (
     Column(Phrase("Clutch")), Column(Phrase("Start"), "s"), Column(Phrase("End"), "s"), Column(Phrase("Order")),
     Column(Phrase("Largest torque"), "N*m"), Column(Phrase("Work on the shaft"), "J"),
-    Column(Phrase("Work of the pendulum"), "J"),
+    Column(Phrase("Work of the pendulum"), "J"), Column(Phrase("Speed at the impact"), "rad/s"),
+    Column(Phrase("Largest torque rate"), "N*m/s"), Column(Phrase("Largest windup"), "rad"),
 )  # fmt: skip
 #: Columns of each table in their order, with their units.
 COLUMNS: Final[dict[str, dict[str, str]]] = {
     "engagements": {
         "clutch": "", "start": "s", "end": "s", "order": "", "torque_max": "N*m", "work_shaft": "J",
-        "work_pendulum": "J", "complete": "",
+        "work_pendulum": "J", "complete": "", "impact_speed": "rad/s", "torque_rate_max": "N*m/s", "windup_max": "rad",
     },
     "periods": {"start": "s", "speed_mean": "rad/s", "speed_max": "rad/s", "torque_mean": "N*m"},
 }  # fmt: skip
+
+
+def require_clutches(study: Study) -> None:
+    """Raise FaultError where the study's machine has no clutches."""
+    if not models.has_clutches(study):
+        message = f"A machine of model {study.model} has no clutches, so it has no engagements."
+        raise FaultError("not-found", message)
+
+
+def columns_csv(names: Iterable[str], rows: Sequence[object]) -> bytes:
+    """Rows as CSV, by the names of their attributes."""
+    return table_csv(names, [[_cell(getattr(row, name)) for row in rows] for name in names])
 
 
 def _cell(value: object) -> object:
     return str(value).lower() if isinstance(value, bool) else value
 
 
+class Clutched:
+    """A view of cases whose machines have clutches."""
+
+    lacks = N_("has no clutches, so that nothing engages")
+
+    def has(self, study: Study) -> bool:
+        """Whether there are clutches."""
+        return models.has_clutches(study)
+
+
 EngagementsAnswer = CaseAnswer[str, Engagements]
 
 
-class EngagementsView(CaseView[EngagementsQuestion, str, Engagements]):
+class EngagementsView(Clutched, CaseView[EngagementsQuestion, str, Engagements]):
     """Every engagement of the clutches of a case, and the means of its periods."""
 
     about = ENGAGEMENTS
     content = "Both tables as JSON, or one of them as CSV."
     shape = EngagementTables
-    lacks = N_("has no clutches, so that nothing engages")
 
     def choose(self, study: Study, case: int, question: EngagementsQuestion) -> str:
         """The table of a CSV file."""
-        if not self.has(study):
-            message = f"A machine of model {study.model} has no clutches, so it has no engagements."
-            raise FaultError("not-found", message)
+        require_clutches(study)
         return choice_of("table", question.table, COLUMNS)
 
     def compute(self, study: Study, case: int, chosen: str) -> Engagements:
@@ -74,9 +97,8 @@ class EngagementsView(CaseView[EngagementsQuestion, str, Engagements]):
 
     def csv(self, answer: EngagementsAnswer) -> bytes:
         """One of the tables."""
-        made, names = answer.result, COLUMNS[answer.chosen]
-        rows = made.rows if answer.chosen == "engagements" else made.periods
-        return table_csv(names, [[_cell(getattr(row, name)) for row in rows] for name in names])
+        made = answer.result
+        return columns_csv(COLUMNS[answer.chosen], made.rows if answer.chosen == "engagements" else made.periods)
 
     def file_name(self, chosen: str) -> str:
         """The name of the table."""
@@ -97,10 +119,6 @@ class EngagementsView(CaseView[EngagementsQuestion, str, Engagements]):
         table = ShownTable(_("Engagements"), _COLUMNS, [_row(row, made) for row in made.rows[:_SHOWN]])
         return Shown((count, *([few] if len(made.rows) > _SHOWN else [])), (table,))
 
-    def has(self, study: Study) -> bool:
-        """Whether there are clutches."""
-        return models.has_clutches(study)
-
     def said(self, answer: EngagementsAnswer) -> Said:
         """How many engagements there are, or how the case ended."""
         data = {"ending": answer.result.ending, "engagements": len(answer.result.rows)}
@@ -111,8 +129,9 @@ def _row(row: Engagement, made: Engagements) -> list[Cell]:
     """An engagement for people; one that is not complete began before the table, or ends after it."""
     start, end = (joined("", [Amount(time, "s", 8, bare=True)]) for time in (row.start, row.end))
     return [
-        row.clutch,
+        row.clutch + 1,
         Phrase("before {time}", time=start) if not row.complete and row.start <= made.start else start,
         Phrase("after {time}", time=end) if not row.complete and row.end >= made.end else end,
         row.order, row.torque_max, row.work_shaft, row.work_pendulum,
+        None if math.isnan(row.impact_speed) else row.impact_speed, row.torque_rate_max, row.windup_max,
     ]  # fmt: skip

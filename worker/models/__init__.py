@@ -14,7 +14,16 @@ from sprag_study.engine import ENGINE_VERSION, Ending, Run, Span
 from sprag_study.engine.catalogue import Parameter, ResultInfo
 from sprag_study.engine.formulas.expressions import ExpressionError
 from sprag_study.engine.machine_shaft.problems import AssemblyError, InsufficientInertiaError, TableError
-from sprag_study.engine.outcome import Basin, Engagement, Engagements, Portrait, Trajectory
+from sprag_study.engine.outcome import (
+    Basin,
+    ClutchDuty,
+    Duty,
+    Engagement,
+    Engagements,
+    Portrait,
+    TorqueCycles,
+    Trajectory,
+)
 from sprag_study.engine.problems import MachineError
 from sprag_study.engine.run import MEANS_FROM_PERIODS
 from sprag_study.engine.sources import engine_folder, source_hash
@@ -41,6 +50,7 @@ from sprag_study.worker.models.abilities import (
     has_clutches,
     has_strobes,
     run_basin,
+    run_duty,
     run_end_state,
     run_engagements,
     run_portrait,
@@ -106,11 +116,13 @@ __all__ = [
     "Basin",
     "ChunkResult",
     "ChunkTask",
+    "ClutchDuty",
     "ClutchFit",
     "ClutchFitError",
     "ClutchLaw",
     "ClutchLawError",
     "DegreeReport",
+    "Duty",
     "Ending",
     "Engagement",
     "Engagements",
@@ -131,6 +143,7 @@ __all__ = [
     "Share",
     "Span",
     "TableError",
+    "TorqueCycles",
     "Trajectory",
     "WorkerEnding",
     "cache_folder",
@@ -172,6 +185,7 @@ __all__ = [
     "result_infos",
     "run_basin",
     "run_chunk",
+    "run_duty",
     "run_end_state",
     "run_engagements",
     "run_of",

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag_study.engine.machine_shaft.transient_course import Course, Transient
-    from sprag_study.engine.outcome import Basin, Engagements, Portrait
+    from sprag_study.engine.outcome import Basin, Duty, Engagements, Portrait
     from sprag_study.worker.models.branches import Along, CaseBranch
     from sprag_study.worker.models.common import KernelShape
     from sprag_study.worker.models.forces import Bearing, Forces
@@ -51,6 +51,14 @@ def has_transients(study: Study) -> bool:
 def run_engagements(study: Study, case: int) -> Engagements:
     """Engagements of the clutches of one case; ValueError where its machine has none."""
     return _of(study, model_of(study.model).clutches, "clutches").engagements(study, case)
+
+
+def run_duty(study: Study, case: int, exponent: float | None) -> Duty:
+    """What the clutches of one case have to bear; ValueError where its machine has none.
+
+    ``exponent`` is that of the Wöhler curve for the equivalent torques; None: they are NaN.
+    """
+    return _of(study, model_of(study.model).clutches, "clutches").duty(study, case, exponent)
 
 
 def run_forces(study: Study, case: int, bearing: Bearing, points: int) -> Forces:

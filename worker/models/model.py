@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from sprag_study.engine import Ending
     from sprag_study.engine.catalogue import Parameter, ResultInfo
     from sprag_study.engine.machine_shaft.transient_course import Course, Transient
-    from sprag_study.engine.outcome import Basin, Engagements, Portrait, Trajectory
+    from sprag_study.engine.outcome import Basin, Duty, Engagements, Portrait, Trajectory
     from sprag_study.worker.models.branches import Along, CaseBranch
     from sprag_study.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
     from sprag_study.worker.models.forces import Bearing, Forces
@@ -32,6 +32,10 @@ class Clutches(Protocol):
 
     def engagements(self, study: Study, case: int) -> Engagements:
         """Engagements of the clutches of one case."""
+        ...
+
+    def duty(self, study: Study, case: int, exponent: float | None) -> Duty:
+        """What the clutches of one case have to bear; ``exponent`` is that of the Wöhler curve."""
         ...
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 from sprag_study.service.client.asynchronous.part import AsyncStudyPart
 from sprag_study.service.client.batches import Ribbon, Yield
 from sprag_study.service.client.frames import Curves
-from sprag_study.service.client.motions import Engagements, Motion
+from sprag_study.service.client.motions import Duty, Engagements, Motion
 from sprag_study.service.client.queries import query_of
 
 if TYPE_CHECKING:
@@ -275,6 +275,17 @@ class AsyncStudyViews(AsyncStudyPart):
         """Compute every engagement of the clutches of one case, and the means of its periods."""
         query = query_of({"start": start})
         return Engagements(cast("Any", await self._of_case(case, "/engagements", query)))
+
+    async def duty(self, case: int, *, exponent: str | None = None, start: int | None = None) -> Duty:
+        """Compute what the clutches of one case have to bear: cycles of torque, impacts, overrunning, slip.
+
+        Parameters
+        ----------
+        exponent : str, optional
+            Exponent of the Wöhler curve, for the equivalent torque.
+        """
+        query = query_of({"exponent": exponent, "start": start})
+        return Duty(cast("Any", await self._of_case(case, "/duty", query)))
 
     async def forces(
         self,

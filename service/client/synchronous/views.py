@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 
 from sprag_study.service.client.batches import Ribbon, Yield
 from sprag_study.service.client.frames import Curves
-from sprag_study.service.client.motions import Engagements, Motion
+from sprag_study.service.client.motions import Duty, Engagements, Motion
 from sprag_study.service.client.queries import query_of
 from sprag_study.service.client.synchronous.part import StudyPart
 
@@ -275,6 +275,17 @@ class StudyViews(StudyPart):
         """Compute every engagement of the clutches of one case, and the means of its periods."""
         query = query_of({"start": start})
         return Engagements(cast("Any", self._of_case(case, "/engagements", query)))
+
+    def duty(self, case: int, *, exponent: str | None = None, start: int | None = None) -> Duty:
+        """Compute what the clutches of one case have to bear: cycles of torque, impacts, overrunning, slip.
+
+        Parameters
+        ----------
+        exponent : str, optional
+            Exponent of the Wöhler curve, for the equivalent torque.
+        """
+        query = query_of({"exponent": exponent, "start": start})
+        return Duty(cast("Any", self._of_case(case, "/duty", query)))
 
     def forces(
         self,

@@ -70,7 +70,7 @@ _MOTION: Final = CASE_VIEWS["trajectory"]
 _PHASES: Final = "phases"
 #: The views below the motion, in their order.
 PARTS: Final[dict[str, CaseView[Any, Any, Any]]] = {
-    **{name: CASE_VIEWS[name] for name in ("engagements", "forces", "strobes", "section")},
+    **{name: CASE_VIEWS[name] for name in ("engagements", "duty", "forces", "strobes", "section")},
     _PHASES: PhasesView(),
     **{name: CASE_VIEWS[name] for name in ("branch", "diagram", "basin", "transient")},
 }

@@ -12,7 +12,8 @@ from benchmarks.workloads import W1
 from sprag_study.engine.endings import Ending
 from sprag_study.engine.outcome import Engagement, Engagements
 from sprag_study.engine.run import Reset, SettledRun
-from sprag_study.engine.vibration_drive.engagements import MAX_PERIODS, engagements, settled_engagements
+from sprag_study.engine.vibration_drive.engagements import engagements, settled_engagements
+from sprag_study.engine.vibration_drive.examined import MAX_PERIODS
 from sprag_study.engine.vibration_drive.regimes import settled_infos
 from sprag_study.engine.vibration_drive.settle import settle
 from sprag_study.engine.vibration_drive.simulate import trajectory

@@ -71,6 +71,7 @@ OPERATIONS: dict[str, tuple[Call, str]] = {
     "get_diagram": (lambda _, s: s.diagram(3, LOAD), "show ID diagram --case 3 --along shaft.load"),
     "get_section": (lambda _, s: s.section(3), "show ID section --case 3"),
     "get_engagements": (lambda _, s: s.engagements(3), "show ID engagements --case 3"),
+    "get_duty": (lambda _, s: s.duty(3, exponent=5), "show ID duty --case 3"),
     "get_forces": (lambda _, s: s.forces(3), "show ID forces --case 3"),
     "get_strobes": (lambda _, s: s.strobes(3), "show ID strobes --case 3"),
     "get_transient": (lambda _, s: s.transient(3, "run-up"), "show ID transient --case 3 --kind run-up"),

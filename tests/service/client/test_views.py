@@ -43,6 +43,7 @@ CALLS: list[tuple[str, tuple[Any, ...], dict[str, Any], str]] = [
     ("trajectory", (3, 0, "2 periods"), {"points": 50, "start": 1}, "from=0&to=2 periods&points=50&start=1"),
     ("trajectory", (3,), {"begin": 0.5, "end": 1.0}, "from=0.5&to=1.0"),
     ("engagements", (3,), {"start": 2}, "start=2"),
+    ("duty", (3,), {"exponent": 5, "start": 2}, "exponent=5&start=2"),
     ("forces", (3,), {"load_rating": "12 kN", "bearing": "roller", "share": 0.5, "points": 50},
      "load_rating=12 kN&bearing=roller&share=0.5&points=50"),
     ("strobes", (3,), {}, ""),

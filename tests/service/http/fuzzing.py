@@ -74,6 +74,7 @@ FURTHER_RULES: Final = (
     "get_section",
     "get_basin",
     "get_engagements",
+    "get_duty",
     "get_forces",
     "get_strobes",
     "get_audit",

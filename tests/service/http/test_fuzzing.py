@@ -39,6 +39,7 @@ NEVER_SERVED = {
             "calibration",
             "front",
             "cases/{case}/engagements",
+            "cases/{case}/duty",
             "cases/{case}/forces",
             "cases/{case}/strobes",
             "cases/{case}/branch",

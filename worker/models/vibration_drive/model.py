@@ -56,8 +56,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag_study.engine.catalogue import Parameter
-    from sprag_study.engine.outcome import Basin, Engagements, Portrait, Trajectory
+    from sprag_study.engine.outcome import Basin, Duty, Engagements, Portrait, Trajectory
     from sprag_study.engine.run import Reset, Unit
+    from sprag_study.engine.vibration_drive.examined import Examined
     from sprag_study.worker.models.branches import Along, CaseBranch
     from sprag_study.worker.models.forces import Bearing, Forces
     from sprag_study.worker.models.model import Clutches, Reactions, Strobes
@@ -353,12 +354,24 @@ class VibrationDrive(Model):
 class _Clutches:
     def engagements(self, study: Study, case: int) -> Engagements:
         """Those of one turn of the settled motion for a settled study, otherwise those in the window."""
-        from sprag_study.engine.vibration_drive.engagements import engagements, settled_engagements
+        from sprag_study.engine.vibration_drive.engagements import tables_of
 
-        columns = case_machine(study, case)
-        if is_settled(study.run):
-            return settled_engagements(columns, settings_of(study.run), start_of(study, case))
-        return engagements(columns, run_of(study.run))
+        return tables_of(_examined(study, case))
+
+    def duty(self, study: Study, case: int, exponent: float | None) -> Duty:
+        """That of one turn of the settled motion for a settled study, otherwise that in the window."""
+        from sprag_study.engine.vibration_drive.duty import duty_of
+
+        return duty_of(_examined(study, case), exponent)
+
+
+def _examined(study: Study, case: int) -> Examined:
+    from sprag_study.engine.vibration_drive.examined import examined, examined_settled
+
+    columns = case_machine(study, case)
+    if is_settled(study.run):
+        return examined_settled(columns, settings_of(study.run), start_of(study, case))
+    return examined(columns, run_of(study.run))
 
 
 class _Reactions:

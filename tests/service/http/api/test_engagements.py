@@ -42,6 +42,12 @@ def test_both_tables_as_json(service: Service, one_case: str) -> None:
         )
     )
     assert max(each["torque_max"] for each in body["engagements"]) == pytest.approx(row["torque.max"], rel=1e-12)
+    assert max(each["windup_max"] for each in body["engagements"]) == pytest.approx(
+        row["pendulums.0.windup.max"], rel=1e-9
+    )
+    assert all(each["torque_rate_max"] > 0.0 for each in body["engagements"])
+    begun = [each["start"] > body["start"] for each in body["engagements"]]
+    assert [each["impact_speed"] is not None for each in body["engagements"]] == begun
     work = sum(each["work_shaft"] for each in body["engagements"])
     assert work == pytest.approx(row["power.clutch.mean"] * 6 / 25.5, rel=1e-9)
     assert len(body["periods"]) == 12

@@ -1,0 +1,183 @@
+"""The part of a case's motion in which its clutches are examined: the window of a run, or one turn of an orbit."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sprag_study.engine.catalogue import ResultInfo
+from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.run import Run, SettledRun
+from sprag_study.engine.vibration_drive.automaton import Clutch
+from sprag_study.engine.vibration_drive.cases import Column, case_matrix, pendulum_count, unloaded, with_lengths
+from sprag_study.engine.vibration_drive.characteristics import characteristics
+from sprag_study.engine.vibration_drive.integration import integrate
+from sprag_study.engine.vibration_drive.kernel import Kernel, kernel_of
+from sprag_study.engine.vibration_drive.layout import OUT_ENDING, PendulumSample, pendulum_samples
+from sprag_study.engine.vibration_drive.pieces import Pieces
+from sprag_study.engine.vibration_drive.regimes import Regime, settled_infos
+from sprag_study.engine.vibration_drive.results import result_infos
+from sprag_study.engine.vibration_drive.settle import settle
+from sprag_study.engine.vibration_drive.strobes import BEGIN, PENDULUM_WIDTH, SHAFT_WIDTH, WINDUP
+
+Floats = NDArray[np.float64]
+
+#: Most excitation periods that are examined: the last ones of a longer run.
+MAX_PERIODS = 500
+#: Initial capacity in steps per period.
+_STEPS = 100
+
+
+@dataclass(frozen=True, slots=True)
+class Examined:
+    """A part of a motion, by its steps.
+
+    Attributes
+    ----------
+    start, end : float
+        The part, in s. A turn of an orbit counts from the start of an excitation period.
+    regime : str
+        Name of the settled motion's regime; "" for a run of a given time.
+    ending : Ending
+    period : float
+        The excitation's, in s.
+    turn : int
+        Excitation periods after which the motion repeats itself; 0 where it does not.
+    begin, last : float
+        Start and end of the recorded steps, in excitation periods.
+    steps : Pieces or None
+        Recorded steps: those of the run, or those of two turns of an orbit. None where the case does not end ok, and
+        where no clutch transmits torque in the limit of a vanishing load.
+    part : Pieces or None
+        Those of the part.
+    losses : float64 array, shape (n,)
+        Mean power in W that the damping of each clutch takes.
+    """
+
+    start: float
+    end: float
+    regime: str
+    ending: Ending
+    period: float
+    turn: int
+    begin: float
+    last: float
+    steps: Pieces | None
+    part: Pieces | None
+    losses: Floats
+
+
+def examined(columns: Mapping[str, ArrayLike], run: Run) -> Examined:
+    """The window of a run; of one longer than ``MAX_PERIODS`` only its last periods.
+
+    Parameters
+    ----------
+    columns : mapping
+        As for ``simulate``, scalars only.
+    run : Run
+
+    Raises
+    ------
+    ValueError
+        If a required parameter is missing or the number of pendulums or coefficients is out of range.
+    """
+    frequency = float(np.asarray(columns["excitation.frequency"]))
+    last = run.duration.in_periods(frequency)
+    start, end = run.window_in_periods(frequency)
+    end = min(end, last)
+    since = max(0.0, last - MAX_PERIODS)
+    start = min(max(start, since), end)
+    module = kernel_of(columns, run.tolerance)
+    matrix = case_matrix(columns, run, 1)
+    ending, steps, sums = _recorded(module, matrix, run, since, last - since)
+    losses = _losses(result_infos(module.LAYOUT.n), characteristics(module.LAYOUT, matrix, sums)[0])
+    period = 1.0 / frequency
+    ok = ending == Ending.OK
+    return Examined(
+        start * period, end * period, "", ending, period, 0, since, last, steps if ok else None,
+        steps.between(start, end) if ok else None, losses,
+    )  # fmt: skip
+
+
+def examined_settled(columns: Mapping[str, ArrayLike], settings: SettledRun, start: Floats | None = None) -> Examined:
+    """One turn of the settled motion; of irregular or unsettled motion, the ``settings.max_period`` periods after the
+    search.
+
+    Parameters
+    ----------
+    columns : mapping
+        As for ``simulate``, scalars only.
+    settings : SettledRun
+    start : array, shape (1, strobes.width(n)), optional
+        As ``starts`` of ``settle``; without it the case's own start.
+
+    Raises
+    ------
+    ValueError
+        If a required parameter is missing or the number of pendulums or coefficients is out of range.
+    """
+    settled = settle(columns, settings, cases=1, starts=start)
+    regime, ending = Regime(int(settled.regimes[0])), ENDINGS[int(settled.endings[0])]
+    period = 1.0 / float(np.asarray(columns["excitation.frequency"]))
+    turn = int(settled.orders[0]) if regime.repeats else 0
+    periods = turn or settings.max_period
+    name = regime.name.lower()
+    losses = _losses(settled_infos(pendulum_count(columns)), settled.values[0])
+    free = bool(unloaded(case_matrix(columns, settings.run, 1), pendulum_count(columns))[0])
+    nothing = Examined(0.0, periods * period, name, ending, period, turn, 0.0, periods, None, None, losses)
+    if ending != Ending.OK or (free and regime in (Regime.COASTING, Regime.HELD)):
+        return nothing  # in the limit of a vanishing load no clutch transmits torque
+    run = settings.fine if turn else settings.run
+    begin, length = float(settled.points[0, BEGIN]), float(2 * turn or periods)
+    matrix = with_lengths(case_matrix(columns, run, 1), np.array([begin]), np.array([length]), windowed=False)
+    module = kernel_of(columns, settings.tolerance)
+    ending, steps = read_steps(module, matrix, run, 0.0, length + 1.0, starts=settled.points)
+    if ending != Ending.OK:
+        return replace(nothing, ending=ending)
+    if turn:
+        part = steps.between(begin, begin + turn)
+        return Examined(0.0, turn * period, name, ending, period, turn, begin, begin + length, steps, part, losses)
+    end = (begin + periods) * period
+    return Examined(begin * period, end, name, ending, period, 0, begin, begin + length, steps, steps, losses)
+
+
+def read_steps(
+    module: Kernel, matrix: Floats, run: Run, since: float, periods: float, starts: Floats | None = None
+) -> tuple[Ending, Pieces]:
+    """How the one case of a matrix ends, and its steps from the time ``since`` on (in excitation periods).
+
+    With ``starts`` the run begins there, and so do its steps.
+    """
+    ending, steps, _ = _recorded(module, matrix, run, since, periods, starts)
+    return ending, steps
+
+
+def _recorded(
+    module: Kernel, matrix: Floats, run: Run, since: float, periods: float, starts: Floats | None = None
+) -> tuple[Ending, Pieces, Floats]:
+    """As ``read_steps``, with the sums of the run."""
+    room = int(_STEPS * (periods + 2.0))
+    while True:
+        done = integrate(module, matrix, run, starts=starts, pieces=room, since=since)
+        if np.isnan(done.pieces[-1, 0]):
+            ending = ENDINGS[int(done.sums[0, OUT_ENDING])]
+            pieces = Pieces.read(module.LAYOUT, done.pieces, float(matrix[0, Column.PERIOD]))
+            return ending, _wound(pieces, module, matrix, run, starts), done.sums
+        room *= 2
+
+
+def _wound(pieces: Pieces, module: Kernel, matrix: Floats, run: Run, starts: Floats | None) -> Pieces:
+    """The steps with the windups of the clutches that are wound up when they begin."""
+    if not len(pieces.length) or not np.any(pieces.states[0] >= Clutch.ENGAGED):
+        return pieces
+    if starts is not None:
+        return pieces.wound(starts[0, SHAFT_WIDTH + WINDUP :: PENDULUM_WIDTH])
+    sample = integrate(module, matrix, run, times=pieces.start[:1]).samples[0]
+    return pieces.wound([sample[pendulum_samples(i)][PendulumSample.WINDUP] for i in range(module.LAYOUT.n)])
+
+
+def _losses(infos: tuple[ResultInfo, ...], values: Floats) -> Floats:
+    chosen = [info.name.startswith("pendulums.") and info.name.endswith(".power.clutch_loss") for info in infos]
+    losses: Floats = values[np.flatnonzero(chosen)]
+    return losses
