@@ -208,12 +208,12 @@ def extremes(series: Floats) -> tuple[Ints, Floats]:
     """
     grid = np.linspace(0.0, 1.0, _POINTS)
     slope = series[:, 1:] * np.arange(1, series.shape[1])
-    signs = np.sign(slope @ (grid ** np.arange(slope.shape[1])[:, np.newaxis]))
-    rows, points = np.nonzero(signs[:, :-1] * signs[:, 1:] < 0.0)
-    low, high, falls = grid[points], grid[points + 1], signs[rows, points]
+    rises = slope @ (grid ** np.arange(slope.shape[1])[:, np.newaxis]) >= 0.0
+    rows, points = np.nonzero(rises[:, :-1] != rises[:, 1:])
+    low, high, first = grid[points], grid[points + 1], rises[rows, points]
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        before = np.sign(_at(slope[rows], middle)) == falls
+        before = (_at(slope[rows], middle) >= 0.0) == first
         low, high = np.where(before, middle, low), np.where(before, high, middle)
     every = np.arange(len(series))
     at = np.concatenate([np.zeros(len(series)), 0.5 * (low + high), np.ones(len(series))])

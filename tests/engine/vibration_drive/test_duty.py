@@ -17,6 +17,7 @@ from sprag_study.engine.run import SettledRun
 from sprag_study.engine.vibration_drive.duty import duty_of
 from sprag_study.engine.vibration_drive.engagements import engagements
 from sprag_study.engine.vibration_drive.examined import Examined, examined, examined_settled
+from sprag_study.engine.vibration_drive.pieces import extremes
 from sprag_study.engine.vibration_drive.rainflow_counts import Cycle, cycles, equivalent, spectrum
 from tests.engine.vibration_drive.drive import Columns, drive, one, periods
 from tests.engine.vibration_drive.reference_equations import Floats
@@ -78,6 +79,16 @@ def test_rounding_is_no_cycle_and_cycles_alike_are_one() -> None:
     assert len(counted) == 4
     (cycle,) = spectrum(counted)
     assert cycle == pytest.approx((7.0 + 5e-5, 3.5 + 2.5e-5, 2.0), rel=1e-12)
+
+
+def test_turning_points_between_and_on_the_points_of_a_step() -> None:
+    """The first is on one of the points at which a step is sampled."""
+    rows, values = extremes(np.array([[0.0, 1.0, -1.0, 0.0], [1.0, -0.6, 1.0, 0.0], [0.0, 2.0, -4.5, 3.0 - 1e-3]]))
+    assert rows[:6].tolist() == [0, 0, 0, 1, 1, 1]
+    assert values[:6] == pytest.approx([0.0, 0.25, 0.0, 1.0, 0.91, 1.4])
+    turns = np.roots([3.0 * (3.0 - 1e-3), -9.0, 2.0])
+    inner = sorted(turns[(turns > 0.0) & (turns < 1.0)])
+    assert values[7:-1] == pytest.approx([2.0 * x - 4.5 * x**2 + (3.0 - 1e-3) * x**3 for x in inner])
 
 
 def test_the_equivalent_range() -> None:
