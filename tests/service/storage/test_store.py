@@ -20,6 +20,7 @@ from sprag_study.service.storage.errors import DatabaseBusyError, DatabaseError
 from sprag_study.service.storage.store import Store
 from sprag_study.service.storage.studies.progress import RECENT_CHUNKS, FinishedChunk, RunningChunk, estimate
 from sprag_study.service.storage.tables import STUDIES
+from tests import statements
 from tests.faults import refused
 from tests.worker import fakes
 
@@ -131,7 +132,8 @@ def test_an_old_library_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     assert sqlite_warning() is None
 
 
-def test_connections_are_safe(url: str) -> None:
+def test_connections_are_safe(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sqlite_files.DatabaseFile, "_set_pragmas", statements.SET_PRAGMAS)
     with Store.open(url) as store, store.session.read() as connection:
         asked = {
             name: connection.exec_driver_sql(f"PRAGMA {name}").scalar_one()
