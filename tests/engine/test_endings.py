@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -117,6 +118,7 @@ def _any(path: str) -> st.SearchStrategy[float]:
     return st.one_of(choices)
 
 
+@cache  # examining the strategies takes longer than drawing from them
 def _machine(pendulums: int) -> st.SearchStrategy[Columns]:
     paths = {p.path.replace("N", str(i)): p.path for p in PARAMETERS for i in range(pendulums)}
     return st.fixed_dictionaries({path: _any(generic) for path, generic in paths.items()})

@@ -55,7 +55,7 @@ def test_it_computes_elsewhere_and_survives_crashes(computer: ProcessComputer, p
 
 def test_what_is_killed_is_run_once_more(tmp_path: Path, portal: BlockingPortal) -> None:
     """A process may be killed for no fault of what it computes."""
-    computer = ProcessComputer(Limits(60.0, COMPUTATION_BYTES, died="unavailable"))
+    computer = ProcessComputer(Limits(60.0, COMPUTATION_BYTES, died="unavailable"), prepare=fakes.prepare_nothing)
     try:
         for number in (signal.SIGKILL, signal.SIGSEGV):
             trace = tmp_path / number.name
@@ -75,7 +75,7 @@ def test_what_is_killed_is_run_once_more(tmp_path: Path, portal: BlockingPortal)
     ],
 )
 def test_what_dies_twice_is_told(portal: BlockingPortal, died: Kind, number: int, kind: str) -> None:
-    computer = ProcessComputer(Limits(60.0, COMPUTATION_BYTES, died=died))
+    computer = ProcessComputer(Limits(60.0, COMPUTATION_BYTES, died=died), prepare=fakes.prepare_nothing)
     try:
         with pytest.raises(ApiError) as refused:
             portal.call(computer.run, signal.raise_signal, number)
@@ -95,9 +95,8 @@ def test_a_kernel_takes_longer_than_a_computation_may_and_outlives_its_request(
     begun, told = tmp_path / "begun", tmp_path / "told"
     os.mkfifo(begun)
     os.mkfifo(told)
-    computer = ProcessComputer(
-        Limits(0.01, COMPUTATION_BYTES), load=partial(fakes.load_between, begun=str(begun), told=str(told))
-    )
+    load = partial(fakes.load_between, begun=str(begun), told=str(told))
+    computer = ProcessComputer(Limits(0.01, COMPUTATION_BYTES), prepare=fakes.prepare_nothing, load=load)
     try:
         left = portal.start_task_soon(computer.load, SHAPE)
         begun.read_text()  # waits until it compiles
@@ -115,7 +114,7 @@ def test_the_end_of_a_kernel_that_nobody_waits_for_is_not_logged(tmp_path: Path)
     os.mkfifo(begun)
     os.mkfifo(told)
     load = partial(fakes.load_between, begun=str(begun), told=str(told))
-    computers = [ProcessComputer(Limits(60.0, COMPUTATION_BYTES), load=load)]
+    computers = [ProcessComputer(Limits(60.0, COMPUTATION_BYTES), prepare=fakes.prepare_nothing, load=load)]
     logged: list[dict[str, object]] = []
 
     async def leave_and_close() -> None:
@@ -151,7 +150,7 @@ def test_it_is_ready_when_its_processes_are(tmp_path: Path, portal: BlockingPort
 
 
 def test_each_process_is_made_ready(tmp_path: Path, portal: BlockingPortal) -> None:
-    computer = ProcessComputer(Limits(60.0, COMPUTATION_BYTES), processes=3)
+    computer = ProcessComputer(Limits(60.0, COMPUTATION_BYTES), processes=3, prepare=fakes.prepare_nothing)
     try:
         portal.call(computer.ready, fakes.leave_a_trace, str(tmp_path))
         assert len(list(tmp_path.iterdir())) == 3
@@ -169,7 +168,7 @@ def test_a_process_that_cannot_be_made_ready_is_told(portal: BlockingPortal) -> 
 
 
 def test_a_kernel_that_fails_is_told_and_tried_again(portal: BlockingPortal) -> None:
-    computer = ProcessComputer(Limits(60.0, COMPUTATION_BYTES), load=fakes.load_dies)
+    computer = ProcessComputer(Limits(60.0, COMPUTATION_BYTES), prepare=fakes.prepare_nothing, load=fakes.load_dies)
     try:
         for _ in range(2):
             with pytest.raises(ApiError) as died:

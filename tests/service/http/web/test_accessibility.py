@@ -6,7 +6,7 @@ import json
 from datetime import UTC, datetime, timedelta
 from typing import TYPE_CHECKING, Any, Final
 
-from axe_playwright_python.sync_playwright import Axe
+from axe_playwright_python.base import AXE_SCRIPT
 
 from sprag_study.service.http.roles import ROLES
 from sprag_study.service.jobs.scheduler import Scheduler
@@ -78,6 +78,9 @@ SHORTER: Final = """(once) => {
   if (once) sessionStorage.setItem("shapes", JSON.stringify([[...numbers], [...places]]));
   return ids.filter((id, at) => known.size < ids.length && ids.indexOf(id) !== at);
 }"""
+#: Each finding of axe, without what it says about all that is right.
+FINDINGS: Final = """(options) => axe.run(document, options).then(({ violations }) =>
+  violations.flatMap(({ id, nodes }) => nodes.map(({ html }) => `${id}: ${html.slice(0, 200)}`)))"""
 #: Rules whose findings depend on colours, on the width and on the language.
 NARROW: Final = [
     "color-contrast", "link-in-text-block", "scrollable-region-focusable", "target-size",
@@ -183,20 +186,26 @@ def night(service: Service) -> None:
     assert all(run["stages"] for run in service.get("/night")["runs"])
 
 
-def findings(page: Page, axe: Axe, options: dict[str, Any]) -> list[str]:
+def judged(page: Page) -> Page:
+    """The tab, whose pages have axe from their beginning: given to each anew it would be compiled from its text."""
+    page.add_init_script(AXE_SCRIPT)
+    return page
+
+
+def findings(page: Page, options: dict[str, Any]) -> list[str]:
     """What axe finds on the page as it is."""
-    found = axe.run(page, options={"resultTypes": ["violations"], "selectors": False, **options}).response["violations"]
-    return [f"{one['id']}: {node['html'][:200]}" for one in found for node in one["nodes"]]
+    found: list[str] = page.evaluate(FINDINGS, {"resultTypes": ["violations"], "selectors": False, **options})
+    return found
 
 
 def test_axe_finds_nothing_on_any_page_and_each_fits_the_screen(
     service: Service, open_tab: Callable[..., Page]
 ) -> None:
     """In English, light and wide; in Ukrainian, dark and narrow: these show what any other combination would."""
-    english = open_tab(locale="en-GB", viewport=DESKTOP, color_scheme="light")
-    ukrainian = open_tab(locale="uk-UA", viewport=PHONE, color_scheme="dark")
+    english = judged(open_tab(locale="en-GB", viewport=DESKTOP, color_scheme="light"))
+    ukrainian = judged(open_tab(locale="uk-UA", viewport=PHONE, color_scheme="dark"))
     pages = (english, ukrainian)
-    axe, found = Axe(), dict[str, list[str]]()
+    found = dict[str, list[str]]()
 
     def judge(name: str) -> None:
         for size in (TABLET, PHONE):
@@ -206,9 +215,9 @@ def test_axe_finds_nothing_on_any_page_and_each_fits_the_screen(
         for page in pages:
             if twice := page.evaluate(SHORTER, page is ukrainian):
                 found[f"{name}, ids"] = twice
-        if bad := findings(english, axe, {}):
+        if bad := findings(english, {}):
             found[name] = bad
-        if bad := findings(ukrainian, axe, {"runOnly": NARROW}):
+        if bad := findings(ukrainian, {"runOnly": NARROW}):
             found[f"{name}, in Ukrainian, dark and narrow"] = bad
 
     for page in pages:
@@ -232,7 +241,7 @@ def test_axe_finds_nothing_on_any_page_and_each_fits_the_screen(
 
 
 def test_what_is_alike_is_judged_once_and_what_differs_each(open_tab: Callable[..., Page]) -> None:
-    page = open_tab()
+    page = judged(open_tab())
     page.goto("/problems/not-found")
     rows, unnamed = "<tr><td><label>Load <input></label></td></tr>" * 9, "<tr><td><input></td></tr>"
 
@@ -243,7 +252,7 @@ def test_what_is_alike_is_judged_once_and_what_differs_each(open_tab: Callable[.
         return page.locator("tbody").inner_html()
 
     assert shown(rows, unnamed, rows) == rows[: len(rows) // 9 * 2] + unnamed
-    assert [one.partition(":")[0] for one in findings(page, Axe(), {"runOnly": NARROW})] == ["label"]
+    assert [one.partition(":")[0] for one in findings(page, {"runOnly": NARROW})] == ["label"]
     assert shown(rows, unnamed, rows) == ""  # an earlier page had it
     marked = rows.replace("<td>", "<td class=marked>", 1)
     assert "marked" in shown(marked)
