@@ -53,13 +53,12 @@ class Ended:
         return json.loads(self.out)
 
 
-def sprag(*arguments: object, cwd: Path | None = None, stdin: bytes | None = None, **more: str) -> Ended:
+def sprag(*arguments: object, cwd: Path | None = None, **more: str) -> Ended:
     """Run one command to its end."""
     done = subprocess.run(
         [*COMMAND, *map(str, arguments)],
         cwd=cwd,
-        input=stdin,
-        stdin=subprocess.DEVNULL if stdin is None else None,
+        stdin=subprocess.DEVNULL,
         capture_output=True,
         timeout=SECONDS,
         env=environment(**more),

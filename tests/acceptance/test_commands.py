@@ -146,7 +146,7 @@ def test_a_run_kept_in_a_database_is_found_there_by_whoever_has_the_token(
     tmp_path: Path, sprag: Sprag, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     database = tmp_path / "study.sqlite3"
-    done = sprag("run", SMALL, "--db", database, "--json")
+    done = sprag("run", SMALL, "--db", database, "--json", "--processes", 1)
     assert done.code == 0
     assert sprag("admin", "db", "check", "--db", database).code == 0
     copy = tmp_path / "copy.sqlite3"
@@ -204,12 +204,11 @@ def test_a_reader_that_goes_away_is_no_failure_to_talk_about(tmp_path: Path) -> 
         assert process.wait(SECONDS) == 141
 
 
-SERVE = "serve --json --port 0 --db x.sqlite3"
-#: Commands that write with each of the ways to write: tables, plain text, JSON, click's help, a service; and each way
-#: to have no reader.
+#: Commands that write with each of the ways to write: tables, plain text, JSON, click's help; and each way to have no
+#: reader. What a service does where nobody reads its address does not depend on the way.
 WITHOUT_READER = [
     *product(("presets", "admin token", "presets --json", "run --help"), (">&-", ">&- <&-", "| true")),
-    *product((SERVE,), (">&- <&-", "| true")),
+    ("serve --json --port 0 --db x.sqlite3", ">&- <&-"),
 ]
 
 
@@ -304,11 +303,12 @@ def test_a_full_disk_is_storage_trouble(sprag: Sprag) -> None:
     assert sprag("run", SMALL, "--processes", 1, "-o", "/dev/full").code == 3
 
 
-def test_specs_and_data_come_through_standard_input() -> None:
-    assert processes.sprag("check", "-", stdin=(EXAMPLES / "two_pendulums.toml").read_bytes()).code == 0
-    measured = (EXAMPLES / "clutch_measured.csv").read_bytes()
-    fitted = processes.sprag("fit", "-", "--accuracy", "0.05", "--json", stdin=measured)
-    assert fitted.data["degree"] == 3
+def test_specs_and_data_come_through_standard_input(sprag: Sprag, monkeypatch: pytest.MonkeyPatch) -> None:
+    with (EXAMPLES / "two_pendulums.toml").open() as spec, (EXAMPLES / "clutch_measured.csv").open() as measured:
+        monkeypatch.setattr("sys.stdin", spec)
+        assert sprag("check", "-").code == 0
+        monkeypatch.setattr("sys.stdin", measured)
+        assert sprag("fit", "-", "--accuracy", "0.05", "--json").data["degree"] == 3
 
 
 def test_output_for_a_terminal_of_another_character_set() -> None:
