@@ -38,11 +38,14 @@ _PLACE: Final = re.compile(r"%\((\w+)\)s|\{(\w+)[^{}]*\}|(</?[a-z][^>]*>)")
 Found = dict[Key, str]
 
 
-def of_code(text: str, where: str) -> Iterator[tuple[Key, str]]:
-    """The texts of a Python module and their plurals. Raises ValueError for one that is not a constant."""
-    for node in ast.walk(ast.parse(text)):
-        if not isinstance(node, ast.Call):
-            continue
+def calls(text: str) -> list[ast.Call]:
+    """The calls of functions in a Python module."""
+    return [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Call)]
+
+
+def of_code(nodes: Iterable[ast.Call], where: str) -> Iterator[tuple[Key, str]]:
+    """The texts in calls and their plurals. Raises ValueError for one that is not a constant."""
+    for node in nodes:
         name = getattr(node.func, "id", getattr(node.func, "attr", ""))
         names = _FUNCTIONS.get(name, ())
         given = node.args[: len(names)]
@@ -71,7 +74,7 @@ def vocabularies() -> Iterator[tuple[Key, str]]:
     """Texts that are values of the program and translated where they are shown, with their plurals."""
     for noun in NOUNS:
         yield Key(f"{{n}} {noun}"), f"{{n}} {noun}s"
-    yield from ((Key(text), "") for text in (*vocabulary(), *form_values(), *fault_texts()))
+    yield from ((Key(text), "") for text in (*vocabulary(), *form_values()))
     yield from ((Key(unit, "unit"), "") for unit in units())
     yield from ((Key(text), "") for text in help_texts(command_line(languages.ENGLISH)))
     yield from ((Key(preset.shows), "") for preset in ABOUT.values())
@@ -83,7 +86,10 @@ def texts() -> Found:
     pairs: list[tuple[Key, str]] = [*vocabularies(), *((Key(text), "") for text in script_texts())]
     for folder in CODE:
         for file in sorted((ROOT / folder).rglob("*.py"), key=str):
-            pairs += of_code(file.read_text(encoding="utf-8"), str(file.relative_to(ROOT)))
+            where, nodes = str(file.relative_to(ROOT)), calls(file.read_text(encoding="utf-8"))
+            pairs += of_code(nodes, where)
+            if folder == "service":
+                pairs += ((Key(text), "") for text in fault_texts(nodes, where))
     environment = _templates()
     assert environment.loader is not None
     for name in environment.list_templates(extensions=["html"]):

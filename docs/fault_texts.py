@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Iterable, Iterator
 from typing import Final
 
 from sprag_study.service.spec.described import A_LIST, NO_LIST
 
-_SERVICE: Final = Path(__file__).resolve().parents[1] / "service"
 #: Functions that take the message of a fault, and its place among their arguments.
 _MESSAGE: Final = {
     **dict.fromkeys(("fault", "Fault", "ParameterFault", "refused", "parameter_error"), 2),
@@ -27,15 +25,14 @@ _CODE: Final = re.compile(r"`[^`]*`|'[^']*'|\"[^\"]*\"|\[[^\]]*\]|--\S+|\b(?:csv
 _WORDS: Final = re.compile(r"[a-z]{3}|\b(?:as|in|no|or)\b")
 
 
-def fault_texts() -> Iterator[str]:
+def fault_texts(calls: Iterable[ast.Call], where: str) -> Iterator[str]:
     """Messages of faults and what they say is allowed; some more than once. Those with values are sentences.
 
-    Raises ValueError for an f-string, which cannot be translated.
+    ``calls`` are those of a module of the service, ``where`` is its path from the root. Raises ValueError for an
+    f-string, which cannot be translated.
     """
-    for file in sorted(_SERVICE.rglob("*.py")):
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Call):
-                yield from _texts(node, str(file.relative_to(_SERVICE.parent)))
+    for call in calls:
+        yield from _texts(call, where)
 
 
 def _texts(call: ast.Call, where: str) -> Iterator[str]:

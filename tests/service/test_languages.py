@@ -144,14 +144,14 @@ def test_what_the_check_finds() -> None:
 
 def test_texts_of_code_are_found_and_f_strings_refused() -> None:
     code = '_("a " "b")\nx.ngettext("one", "many", n)\npgettext("ctx", "c")\n_(name)\nN_("d")'
-    assert dict(catalogues.of_code(code, "x.py")) == {
+    assert dict(catalogues.of_code(catalogues.calls(code), "x.py")) == {
         Key("a b"): "",
         Key("one"): "many",
         Key("c", "ctx"): "",
         Key("d"): "",
     }
     with pytest.raises(ValueError, match=r"x\.py:1"):
-        list(catalogues.of_code('_(f"{n} cases")', "x.py"))
+        list(catalogues.of_code(catalogues.calls('_(f"{n} cases")'), "x.py"))
 
 
 def test_texts_of_templates_are_found() -> None:
