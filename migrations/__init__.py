@@ -35,21 +35,34 @@ def bring_up(connection: sa.Connection, described: sa.MetaData, before: str) -> 
 
 def _add(connection: sa.Connection, described: sa.MetaData) -> None:
     """Add the tables, columns and indexes that the database lacks."""
-    there = sa.inspect(connection)
-    names = set(there.get_table_names())
+    there, dialect = sa.inspect(connection), connection.dialect
+    columns, indexes = there.get_multi_columns(), there.get_multi_indexes()
     for table in described.sorted_tables:
-        if table.name not in names:
+        if (None, table.name) not in columns:
             table.create(connection)
             continue
-        columns = {column["name"] for column in there.get_columns(table.name)}
-        for column in table.columns:
-            if column.name not in columns:
-                text = sa.schema.CreateColumn(column).compile(dialect=connection.dialect)
-                connection.exec_driver_sql(f"ALTER TABLE {table.name} ADD COLUMN {text}")
-        indexes = {index["name"] for index in there.get_indexes(table.name)}
+        known = {column["name"] for column in columns[None, table.name]}
+        missing = [column for column in table.columns if column.name not in known]
+        if missing and _can_be_made_anew(connection, table):
+            table.drop(connection)
+            table.create(connection)
+            continue
+        added = [f"ADD COLUMN {sa.schema.CreateColumn(column).compile(dialect=dialect)}" for column in missing]
+        if added and dialect.name != "sqlite":  # which adds one at a time
+            added = [", ".join(added)]
+        for text in added:
+            connection.exec_driver_sql(f"ALTER TABLE {table.name} {text}")
+        indexed = {index["name"] for index in indexes[None, table.name]}
         for index in table.indexes:
-            if index.name not in indexes:
+            if index.name not in indexed:
                 index.create(connection)
+
+
+def _can_be_made_anew(connection: sa.Connection, table: sa.Table) -> bool:
+    """Whether a table of rows has none: SQLite reads all tables again after each of a hundred columns added to it."""
+    if connection.dialect.name != "sqlite" or "case_number" not in table.c:
+        return False
+    return connection.execute(sa.select(sa.literal(1)).select_from(table).limit(1)).first() is None
 
 
 def _hash_kin(connection: sa.Connection) -> None:

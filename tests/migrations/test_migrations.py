@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -25,7 +26,7 @@ from sprag_study.service.storage.store import Store
 from sprag_study.service.storage.tables import HEAD_REVISION
 from sprag_study.worker import models
 from sprag_study.worker.states import StudyState
-from tests import postgres
+from tests import postgres, statements
 from tests.faults import refused
 from tests.migrations import frozen
 from tests.migrations.frozen import thaw
@@ -40,6 +41,7 @@ _LATER = {"clutch.coefficients.2", "clutch.coefficients.3"}
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
+    statements.share()
     return tmp_path / "sprag.sqlite3"
 
 
@@ -87,15 +89,20 @@ def upgrade(url: str) -> tuple[str | None, str]:
 _KNOWN: dict[str, dict[str, object]] = {}
 
 
-def table(there: sa.Inspector, name: str) -> dict[str, object]:
-    """What a table is, in any order and without names of foreign keys."""
+def tables(there: sa.Inspector, names: Iterable[str]) -> dict[str, dict[str, object]]:
+    """What each table is, in any order and without names of foreign keys."""
+    kinds = ("columns", "pk_constraint", "foreign_keys", "indexes", "unique_constraints", "check_constraints")
+    of = {kind: getattr(there, f"get_multi_{kind}")(filter_names=list(names)) for kind in kinds}
     return {
-        "columns": sorted(str(sorted(column.items(), key=str)) for column in there.get_columns(name)),
-        "key": there.get_pk_constraint(name)["constrained_columns"],
-        "foreign": sorted(str({**key, "name": ""}) for key in there.get_foreign_keys(name)),
-        "indexes": sorted(map(str, there.get_indexes(name))),
-        "unique": sorted(map(str, there.get_unique_constraints(name))),
-        "checks": sorted(map(str, there.get_check_constraints(name))),
+        name: {
+            "columns": sorted(str(sorted(column.items(), key=str)) for column in of["columns"][None, name]),
+            "key": of["pk_constraint"][None, name]["constrained_columns"],
+            "foreign": sorted(str({**key, "name": ""}) for key in of["foreign_keys"][None, name]),
+            "indexes": sorted(map(str, of["indexes"][None, name])),
+            "unique": sorted(map(str, of["unique_constraints"][None, name])),
+            "checks": sorted(map(str, of["check_constraints"][None, name])),
+        }
+        for name in names
     }
 
 
@@ -105,19 +112,20 @@ def schema(session: Session) -> dict[str, object]:
         there = sa.inspect(connection)
         kinds: set[tuple[object, ...]] = set()
         if session.on_server:
-            tables = {name: table(there, name) for name in there.get_table_names()}
+            found = tables(there, there.get_table_names())
         else:
             listed = connection.exec_driver_sql("SELECT name, wr, strict FROM pragma_table_list WHERE schema = 'main'")
             kinds = {tuple(row) for row in listed}
             statements: dict[str, str] = {}
             for name, sql in connection.exec_driver_sql("SELECT tbl_name, sql FROM sqlite_master ORDER BY type, name"):
                 statements[name] = f"{statements.get(name, '')}{sql};"
-            tables = {}
-            for name in there.get_table_names():
-                made_by = statements[name]
-                tables[name] = _KNOWN[made_by] = _KNOWN.get(made_by) or table(there, name)
+            names = there.get_table_names()
+            new = [name for name in names if statements[name] not in _KNOWN]
+            if new:
+                _KNOWN.update({statements[name]: about for name, about in tables(there, new).items()})
+            found = {name: _KNOWN[statements[name]] for name in names}
         rows = connection.exec_driver_sql("SELECT * FROM alembic_version").all()
-        return {"tables": tables, "kinds": kinds, "revision": [tuple(row) for row in rows]}
+        return {"tables": found, "kinds": kinds, "revision": [tuple(row) for row in rows]}
 
 
 def schema_of(url: str) -> dict[str, object]:
