@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import runpy
 import subprocess
 import sys
 from importlib.metadata import version
@@ -48,13 +49,21 @@ def python(*arguments: str, cwd: Path = ROOT) -> subprocess.CompletedProcess[str
     return subprocess.run([sys.executable, *arguments], cwd=cwd, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.parametrize("title", ["Studies run here", "A spec in Python", "Goals of one's own", "SQL", "The engine"])
-def test_the_page_runs(title: str, tmp_path: Path) -> None:
+def test_the_page_runs_as_a_script(tmp_path: Path) -> None:
+    """With processes of its own, which import it."""
     script = tmp_path / "script.py"
-    script.write_text(section(title), encoding="utf-8")
+    script.write_text(section("Studies run here"), encoding="utf-8")
     done = python(str(script))
     assert done.returncode == 0, done.stderr
     assert "rad/s" in done.stdout
+
+
+@pytest.mark.parametrize("title", ["A spec in Python", "Goals of one's own", "SQL", "The engine"])
+def test_the_page_runs(title: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(section(title), encoding="utf-8")
+    runpy.run_path(str(script), run_name="__main__")
+    assert "rad/s" in capsys.readouterr().out
 
 
 def test_the_example_of_derived_parameters_has_the_numbers_of_the_guide() -> None:
