@@ -1,11 +1,13 @@
-"""Ranges that somebody types as one text: ``20 to 35 Hz step 5``, ``0..0,4 Нм через 0,1``, ``20–35 Hz, 4 values``."""
+"""Ranges that somebody types as one text: ``20 to 35 Hz step 5``, ``0..0,4 Нм через 0,1``, ``20–35 Hz in 4``."""
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Final, Literal, cast
 
+from sprag_study.service.languages import gettext, ngettext
+from sprag_study.service.reading.numbers import is_ambiguous, settled
 from sprag_study.service.reading.together import with_unit_of_range
 from sprag_study.service.reading.units import QuantityError, split_typed
 
@@ -13,35 +15,91 @@ from sprag_study.service.reading.units import QuantityError, split_typed
 _BETWEEN: Final = r"(?:\s*(?:\.{2,3}|…)\s*|\s+(?:to|up to|до)\s+|\s*[–—]\s*|\s+-\s+|(?<=[0-9])-(?=[0-9]))"
 _STEP: Final = r"(?:in steps of|steps?(?: of)?|by|з кроком|кроком|крок|через)"
 _VALUES: Final = r"(?:values|points|значень|значення|точок|точки)"
+_COUNT: Final = rf"(?:\s*[,;]\s*(?P<count>[0-9]{{1,7}})\s*{_VALUES}|\s+in\s+(?P<in>[0-9]{{1,7}})(?:\s+{_VALUES})?)"
+_GEOMETRIC: Final = r"(?:geometric|logarithmic|геометрично|логарифмічно)"
+_REFINED: Final = r"(?:refined|з уточненням)"
 _RANGE: Final = re.compile(
     rf"\s*(?:(?:from|від|з)\s+)?(?P<first>\S.*?){_BETWEEN}(?P<last>\S.*?)"
-    rf"(?:\s*[,;]?\s*{_STEP}\s*(?P<step>\S.*?)|\s*[,;]\s*(?P<count>[0-9]{{1,7}})\s*{_VALUES})?\s*"
+    rf"(?:\s*[,;]?\s*{_STEP}\s*(?P<step>\S.*?)|{_COUNT}(?:[,;]?\s+(?P<geometric>{_GEOMETRIC}))?"
+    rf"|[,;]?\s+(?P<refined>{_REFINED}))?\s*"
 )
 #: A number within what should be a unit, as in "0.2 0.3" behind a first number; "1/min" is a unit.
 _NUMBER_WITHIN: Final = re.compile(r"(?:^|[\s/|&±:])(?!1\s*/)[0-9]")
 _LONGEST: Final = 200
 
 
+#: How the values of a range are divided: "refined" where rounds decide which values it has.
+Spacing = Literal["even", "geometric", "refined"]
+
+
 @dataclass(frozen=True, slots=True)
 class TypedRange:
-    """The ends of a range as they were typed, with their unit, and its step or how many values it has, if given."""
+    """A range as it was typed.
+
+    Attributes
+    ----------
+    first, last : its ends with their unit
+    step : its step with its unit; "" for none
+    count : how many values it has, None where that is not said
+    spacing : how its values are divided
+    """
 
     first: str
     last: str
-    step: str
-    count: int | None
+    step: str = ""
+    count: int | None = None
+    spacing: Spacing = "even"
+
+    @property
+    def numbers(self) -> tuple[str, ...]:
+        """Its ends, and its step if it has one."""
+        return (self.first, self.last, self.step) if self.step else (self.first, self.last)
+
+    def with_numbers(self, *numbers: str) -> TypedRange:
+        """The range with other ends and another step, as `numbers` has them."""
+        return replace(self, **dict(zip(("first", "last", "step"), numbers, strict=False)))  # type: ignore[arg-type]
+
+    @property
+    def text(self) -> str:
+        """What one types for it, in the language of the reader."""
+        texts = list(self.numbers)
+        unit, *others = dict.fromkeys(map(_unit, texts))
+        if unit and not others:  # once, at the end
+            texts = [*(text.removesuffix(unit).rstrip() for text in texts[:-1]), texts[-1]]
+        ends = dict(zip(("first", "last", "step"), texts, strict=False))
+        if self.spacing == "refined":
+            return gettext("{first} to {last} refined", **ends)
+        if self.step:
+            return gettext("{first} to {last} step {step}", **ends)
+        if self.count is None:
+            return gettext("{first} to {last}", **ends)
+        text = ngettext("{first} to {last} in {count}", "{first} to {last} in {count}", self.count, count=self.count,
+                        **ends)  # fmt: skip
+        return gettext("{range} geometric", range=text) if self.spacing == "geometric" else text
 
 
 def typed_range(text: str) -> TypedRange | None:
     """The range that a text is; None for anything else, such as a single quantity."""
-    found = _RANGE.fullmatch(text) if len(text) <= _LONGEST else None
-    if found is None or not all(_is_quantity(found[name]) for name in ("first", "last", "step") if found[name]):
+    parts = _RANGE.fullmatch(text) if len(text) <= _LONGEST else None
+    texts = settled([parts[name] or "" for name in ("first", "last", "step")]) if parts else []
+    if parts is None or not all(_is_quantity(text) for text in texts if text):
         return None
-    first, last, step = with_unit_of_range(found["first"], found["last"], found["step"] or "")
-    return TypedRange(first, last, step, int(found["count"]) if found["count"] else None)
+    first, last, step = with_unit_of_range(*texts)
+    count = parts["count"] or parts["in"]
+    spacing = next((name for name in ("geometric", "refined") if parts[name]), "even")
+    return TypedRange(first, last, step, int(count) if count else None, cast("Spacing", spacing))
+
+
+def _unit(text: str) -> str:
+    """The unit of a text as it was typed; "" for none, and for what is no quantity."""
+    try:
+        return split_typed(text)[1]
+    except QuantityError:
+        return ""
 
 
 def _is_quantity(text: str) -> bool:
+    text = text.replace(",", ".", 1) if is_ambiguous(text) else text  # about which the reader of the number asks
     try:
         return not _NUMBER_WITHIN.search(split_typed(text)[1])
     except QuantityError:

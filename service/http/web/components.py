@@ -69,13 +69,13 @@ def _columns(kind: str, values: Values) -> list[_Column]:
     for name, parameter in fields_of(kind).items():
         text, must = values.get(f"fields/{name}", ""), name in needed(kind, {})
         if parameter is None:
-            found.append(_Column(name, words(name), Quantity((text,)), "", kind_of(kind).titles, must))
+            found.append(_Column(name, words(name), Quantity(text), "", kind_of(kind).titles, must))
         elif name == COEFFICIENTS:
             each = "; ".join(placed(parameter, f"{COEFFICIENTS}.{index}").unit for index in range(2))
-            found.append(_Column(name, words(name), Quantity((text,), f"{each}; …"), "0; 200; 0; 20000", {}, must))
+            found.append(_Column(name, words(name), Quantity(text, f"{each}; …"), "0; 200; 0; 20000", {}, must))
         else:
             shown = "" if parameter.unit == "1" else examples(parameter.unit)[0]
-            found.append(_Column(name, words(name), quantity_of([text], parameter.unit, units), shown, {}, must))
+            found.append(_Column(name, words(name), quantity_of(text, parameter.unit, units), shown, {}, must))
     return found
 
 

@@ -94,6 +94,10 @@ def _written_range(node: Node, parameter: Parameter, written: TypedRange) -> Pla
     """The plan of a range that was typed as one text; None, and a question recorded, where it says too little."""
     if not written.step and written.count is None:
         ends = {"first": Typed(written.first), "last": Typed(written.last)}
+        if written.spacing == "refined":
+            node.refuse("invalid-text", N_("is refined between two ends, which are no values"),
+                        allowed=Sentence('"adaptive": ["{first}", "{last}"]', **ends))  # fmt: skip
+            return None
         node.refuse(
             "invalid-text",
             N_("is a range: in which steps, or how many values?"),
@@ -102,7 +106,9 @@ def _written_range(node: Node, parameter: Parameter, written: TypedRange) -> Pla
         return None
     third = written.step if written.count is None else written.count
     own = node.holding([written.first, written.last, third])
-    return (plan_range if written.count is None else plan_linspace)(own, parameter)
+    if written.count is None:
+        return plan_range(own, parameter)
+    return (plan_geomspace if written.spacing == "geometric" else plan_linspace)(own, parameter)
 
 
 def _read_items(node: Node, unit: str, about: str) -> Sequence[Node] | None:

@@ -180,8 +180,7 @@ def test_goals_in_the_form() -> None:
         "/goal/at/0/values": "100; 300 N*mm",
         "/goal/subject_to/0/value": "3000",
         "/goal/subject_to/0/within": "100 N*mm",
-        "/goal/vary/0/from": "1200",
-        "/goal/vary/0/to": "1800 rpm",
+        "/goal/vary/0/values": "1200 to 1800 rpm",
     }
     plan = parse_spec(spec_of(values)[0]).study.plan
     assert plan is not None

@@ -98,7 +98,7 @@ def _fill(values: Values, index: int, column: tuple[str, ...], unit: str) -> Non
     # A decimal comma that stayed in a cell with a unit would prove that the points of the others separate thousands.
     cells = [settled([cell.strip()])[0] for cell in column]
     cells = [f"{cell} {unit}" if unit and _is_bare(cell) else cell for cell in cells]
-    values |= {f"{pointer}/way": "values", f"{pointer}/values": "; ".join(cells)}
+    values[f"{pointer}/values"] = "; ".join(cells)
 
 
 def _finish(values: Values, columns: int) -> None:

@@ -52,6 +52,7 @@ from sprag_study.service.http.web.form.spec import (
     GOAL_DEFAULTS,
     LIMITS,
     REFINE_DEFAULTS,
+    is_refined,
     is_search,
     values_of,
 )
@@ -276,6 +277,7 @@ async def check(context: Ctx, work: Attended, request: Request, values: Form) ->
             "panel": fragment("_form_panel.html", checked=checked, address=origin(request)),
             "pictures": [] if sheet is None else sheet.pictures,
             "spans": {} if sheet is None else sheet.spans,
+            "rows": "" if sheet is None else f"{len(sheet.rows)}{' refined' if is_refined(values) else ''}",
             "fits": {
                 pointer: fragment("_form_fit.html", fit=fit, chart=chart, pointer="")
                 for pointer, (fit, chart) in checked.fits.items()
@@ -340,6 +342,7 @@ def sheet_form(request: Request, values: Values, checked: Checked | None, opened
         "parts": parts,
         "rows": rows,
         "search": is_search(values),
+        "refined": is_refined(values),
         "kept": _kept(values),
         "choices": choices,
         "components": [] if text_mode else component_groups(values, request.app.state.context.store.components.all()),

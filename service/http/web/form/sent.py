@@ -12,12 +12,13 @@ from typing import Final
 from sprag_study.service.http.web.form.entries import Values, names_of
 from sprag_study.service.http.web.form.machine import BASE, entries, form_of, model_name, row_of
 from sprag_study.service.http.web.form.parts import count_of, drop, reshape, with_tolerances
-from sprag_study.service.http.web.form.spec import PARTS, is_search
+from sprag_study.service.http.web.form.spec import PARTS, is_search, with_row_texts
 from sprag_study.service.http.web.form.tolerances import BATCH, own_name
 from sprag_study.service.languages import _
 from sprag_study.service.reading.deviations import with_tolerance
 from sprag_study.service.reading.numbers import parse_number
 from sprag_study.service.reading.quantities import is_si
+from sprag_study.service.reading.ranges import TypedRange, typed_range
 from sprag_study.service.reading.together import split_list, with_last_unit
 from sprag_study.service.reading.units import QuantityError, parse_quantity, split_quantity
 from sprag_study.service.reading.wording import number, unit_text
@@ -36,18 +37,20 @@ TICKS: Final = "ticks:"
 WAS: Final = "was:"
 #: Of the kind that a choice had when the page was made: other kinds have other meanings of the same fields.
 KIND: Final = "kind:"
-#: Numbers of a row that have the row's unit.
-IN_ROW: Final = ("from", "to", "step", "values", "value")
 _BARE: Final = re.compile(r"[-+/\d.,;\seE\u00a0\u202f\u2212'’]*\d[-+/\d.,;\seE\u00a0\u202f\u2212'’]*")
 #: Values between the ends that are proposed for a number.
-_VALUES: Final = "9"
+_VALUES: Final = 9
+_SEVERAL: Final = 2
 
 
 def settle(values: Values, *, with_ticks: bool = True) -> None:
     """Read units and ticks into the fields that they are about, and empty those whose meaning another kind has changed;
     without ticks only take them away.
     """
-    kinds = changed_kinds(values)
+    kinds, whole = changed_kinds(values), with_row_texts(values)
+    for name in values.keys() - whole.keys():
+        del values[name]
+    values |= whole
     for name in [name for name in values if name.startswith((KIND, WAS))]:
         del values[name]
     if with_ticks and kinds:
@@ -55,7 +58,7 @@ def settle(values: Values, *, with_ticks: bool = True) -> None:
     _part_tolerances(values)
     for name in [name for name in values if name.startswith(UNIT)]:
         unit, field = values.pop(name), name.removeprefix(UNIT)
-        for own in (field, *(f"{field}/{part}" for part in IN_ROW)):
+        for own in (field, f"{field}/values"):
             values |= {own: with_unit(values[own], unit)} if own in values else {}
     changed = set[str]()  # their own ticks still say what was before
     for name in [name for name in values if name.startswith(ALIKES)]:
@@ -72,6 +75,7 @@ def settle(values: Values, *, with_ticks: bool = True) -> None:
         for path in paths:
             if path not in changed:
                 _vary(values, part, path, wanted=path in varying)
+            _take_values(values, part, path)
 
 
 def with_first_values(values: Mapping[str, str]) -> Values:
@@ -80,10 +84,15 @@ def with_first_values(values: Mapping[str, str]) -> Values:
     for entry in entries(values):
         row = rows.get(base_path(entry.name)) if entry.field.required else None
         if row is not None and not values.get(entry.name, "").strip():
-            pointer = f"{PARTS[part_of(values)].pointer}/{row}"
-            name = "values" if values.get(f"{pointer}/way") == "values" else "from"
-            found[entry.name] = with_last_unit(split_list(values.get(f"{pointer}/{name}", "")) or [""])[0]
+            found[entry.name] = first_value(values, row)
     return found
+
+
+def first_value(values: Mapping[str, str], row: int) -> str:
+    """The first value of a row of what varies; "" for none."""
+    text = values.get(f"{PARTS[part_of(values)].pointer}/{row}/values", "")
+    written = typed_range(text)
+    return with_last_unit(split_list(text) or [""])[0] if written is None else written.first
 
 
 def _part_tolerances(values: Values) -> None:
@@ -158,6 +167,11 @@ def _empty_copy(values: Values, rows: Rows, name: str) -> None:
 
 def with_unit(text: str, unit: str) -> str:
     """A text of bare numbers with the unit beside it; one with a unit of its own, or a formula, as it is."""
+    written = typed_range(text)
+    if written is not None and unit and not is_si(unit):
+        *others, last = written.numbers
+        bare = all(map(_BARE.fullmatch, written.numbers))
+        return written.with_numbers(*others, f"{last} {unit}").text if bare else text
     return f"{text.strip()} {unit}" if unit and not is_si(unit) and _BARE.fullmatch(text) else text
 
 
@@ -199,17 +213,29 @@ def _vary(values: Values, name: str, path: str, *, wanted: bool) -> None:
         return
     before = count_of(values, name)
     blank = (own for own in range(before) if not any(
-        values.get(f"{PARTS[name].pointer}/{own}/{part}", "").strip() for part in ("path", *IN_ROW)
+        values.get(f"{PARTS[name].pointer}/{own}/{part}", "").strip() for part in ("path", "values")
     ))  # fmt: skip
     row_index = next(blank, before)
     if row_index == before:
         reshape(values, f"add-{name}")
     if count_of(values, name) > row_index:
         row = f"{PARTS[name].pointer}/{row_index}"
-        way = str(PARTS[name].new["way"])
-        values |= {f"{row}/path": path, f"{row}/way": way, f"{row}/count": _VALUES}
-        ends = ends_of(values, path) or ("", "")
-        values |= {f"{row}/{name}": text for name, text in zip(("from", "to"), ends, strict=True) if text}
+        ends = ends_of(values, path)
+        text = "" if ends is None else TypedRange(*ends, count=_VALUES if name == "axes" else None).text
+        values |= {f"{row}/path": path, f"{row}/values": text}
+
+
+def _take_values(values: Values, name: str, path: str) -> None:
+    """Let a number vary over the list or range that somebody has typed into its field, which keeps the first value."""
+    field = base_pointer(path)
+    text = values.get(field, "").strip()
+    if text.startswith("=") or (typed_range(text) is None and len(list(filter(None, text.split(";")))) < _SEVERAL):
+        return
+    _vary(values, name, path, wanted=True)
+    row = varied(values, name).get(path)
+    if row is not None:
+        values[f"{PARTS[name].pointer}/{row}/values"] = text
+        values[field] = first_value(values, row)
 
 
 def ends_of(values: Mapping[str, str], path: str) -> tuple[str, str] | None:

@@ -15,14 +15,15 @@ from sprag_study.service.figures.painter.elements import text_width
 from sprag_study.service.http.web.form.entries import Values, names_of, plain
 from sprag_study.service.http.web.form.machine import BASE, Block, Entry, blocks, form_of, model_name
 from sprag_study.service.http.web.form.parts import count_of
-from sprag_study.service.http.web.form.sent import IN_ROW, part_of, varied
+from sprag_study.service.http.web.form.sent import part_of, varied
 from sprag_study.service.http.web.form.spec import PARTS
 from sprag_study.service.languages import _, gettext
 from sprag_study.service.reading.cyrillic import latin
 from sprag_study.service.reading.numbers import parse_number
 from sprag_study.service.reading.part_names import lower_first
 from sprag_study.service.reading.quantities import offered, preferred
-from sprag_study.service.reading.together import with_last_unit
+from sprag_study.service.reading.ranges import typed_range
+from sprag_study.service.reading.together import split_list, with_last_unit
 from sprag_study.service.reading.units import QuantityError, parse_quantity, plain_signs
 from sprag_study.service.reading.wording import number, unit_text
 from sprag_study.service.spec.fields import base_path, base_pointer
@@ -48,15 +49,15 @@ _MOVED: Final = ("line", "lines", "select", "tick")
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """Texts of fields that have one unit beside them.
+    """The text of a field with its unit beside it.
 
     Attributes
     ----------
-    texts : as the fields show them
+    text : as the field shows it
     unit, units : the chosen one, and those offered; none where plain numbers have no unit
     """
 
-    texts: tuple[str, ...]
+    text: str
     unit: str = ""
     units: tuple[str, ...] = ()
 
@@ -135,7 +136,7 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A row of what varies: its place, label, numbers with their unit, and the numbers that could vary alike."""
+    """A row of what varies: its place, label, values with their unit, and the numbers that could vary alike."""
 
     index: int
     pointer: str
@@ -145,10 +146,6 @@ class Row:
     alikes: tuple[str, ...] = ()
     alike: bool = False
     tied: str = ""
-
-    def text(self, name: str) -> str:
-        """The text of one of its numbers."""
-        return self.quantity.texts[IN_ROW.index(name)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -315,8 +312,8 @@ def _described(blocks: Sequence[Block], spots: Mapping[str, Spot], values: Mappi
     title = _(rows.title, number=int(index) + 1, label=lower_first(kind[1]))
     before = [spots[entry.name] for entry in blocks[0].entries if entry.item in rows.fields]
     texts = [f"{lower_first(_(label))}: {lower_first(text)}" for label, text in others]
-    texts += [f"{lower_first(spot.label)} {_numeral(spot.quantity.texts[0])} {unit_text(spot.quantity.unit)}"
-              for spot in before if spot.quantity.texts[0] and spot.row is None]  # fmt: skip
+    texts += [f"{lower_first(spot.label)} {_numeral(spot.quantity.text)} {unit_text(spot.quantity.unit)}"
+              for spot in before if spot.quantity.text and spot.row is None]  # fmt: skip
     varying = [spots[entry.name] for block in blocks for entry in _all(block.entries)
                if entry.name in spots and spots[entry.name].row is not None]  # fmt: skip
     texts += [_("{label} varies", label=lower_first(spot.label)) for spot in varying]
@@ -369,7 +366,7 @@ class _Making:
         was = None if self.before is None else self.before.get(entry.name, "")
         row = varied(self.values).get(path)
         plain = not getattr(entry.item, "lines", 0) and getattr(entry.item, "kind", "") in ("", "number")
-        quantity = quantity_of([text], field.unit if plain else "", self.units)
+        quantity = quantity_of(text, field.unit if plain else "", self.units)
         return Spot(
             entry, label, path, quantity, text, path in self.numbers, row, self._span(row) if row is not None else "",
             was if was is not None and not _same(was, text, field.unit) else None,
@@ -378,14 +375,10 @@ class _Making:
     def _span(self, row: int) -> str:
         """The values of a row in words: ``0 … 1.6 N·m``."""
         own = self._row(row)
-        way = self.values.get(f"{own.pointer}/way", "")
         unit = f" {unit_text(own.quantity.unit)}" if own.quantity.unit else ""
-        if way == "values":
-            texts = [item for item in re.split(r"\s*;\s*", own.text("values")) if item]
-            span = f"{texts[0]} … {texts[-1]}" if len(texts) > 1 else "".join(texts)
-        else:
-            span = f"{own.text('from') or '?'} … {own.text('to') or '?'}"
-        return span + unit
+        texts = _several(own.quantity.text)
+        ends = texts[:2] if typed_range(own.quantity.text) else [*texts[:1], *texts[1:][-1:]]
+        return " … ".join(ends or ["?"]) + unit
 
     def rows(self) -> Iterable[Row]:
         return (self._row(index) for index in range(count_of(self.values, part_of(self.values))))
@@ -396,10 +389,10 @@ class _Making:
         tied = names_of(self.values.get(f"{pointer}/tied", ""))
         alikes = tuple(other for other in self.numbers if other != path and path and _alike(path) == _alike(other))
         alike = bool(alikes) and set(alikes) <= set(tied)
-        given = [self.values.get(f"{pointer}/{name}", "") for name in IN_ROW]
         entry = model_parameter(model_name(self.values), path) if path else None
         rest = ", ".join(own for own in tied if not alike or own not in alikes)
-        quantity = quantity_of(given, entry.unit if entry else "", self.units, listed=True)
+        text, si = self.values.get(f"{pointer}/values", ""), entry.unit if entry else ""
+        quantity = quantity_of(text, si, self.units, listed=True)
         return Row(index, pointer, path, self.numbers.get(path, path), quantity, alikes, alike, rest)
 
 
@@ -408,72 +401,57 @@ def _alike(path: str) -> str:
     return re.sub(r"\.\d+\.", ".*.", re.sub(r"_[xy]$", "", path))
 
 
-def quantity_of(texts: Sequence[str], si: str, wanted_units: Mapping[str, str], *, listed: bool = False) -> Quantity:
-    """Texts with the unit that they have in common beside them, or as they are, where they have none.
+def quantity_of(text: str, si: str, wanted_units: Mapping[str, str], *, listed: bool = False) -> Quantity:
+    """A text with the unit of its numbers beside it, or as it is, where they have none in common.
 
     Plain numbers are in the SI unit ``si``; they are shown in the unit that is wanted where that has them exactly.
+    ``listed``: the text can be a list or a range.
     """
     units = offered(si)
     if not units:
-        return Quantity(tuple(texts))
+        return Quantity(text)
     wanted = wanted_units.get(si, si)
-    split = _listed if listed else _single
-    parts = split(texts)
-    given = {unit for number, unit in parts if number} if parts else set()
-    if parts is None or len(given) > 1:
-        return Quantity(tuple(texts), si, units)
+    parts = [_NUMBER.fullmatch(item) for item in (_several(text) if listed else [text]) if item.strip()]
+    numbers = [(part[1], part[2].strip()) for part in parts if part]
+    given = {unit for _number, unit in numbers}
+    if len(numbers) < len(parts) or len(given) > 1:
+        return Quantity(text, si, units)
     unit = next(iter(given), None)
     if unit is None:
-        return Quantity(tuple(texts), wanted, units)
+        return Quantity(text, wanted, units)
     if unit:
         own = next((own for own in units if own == latin(plain_signs(unit))), None)
         if own is None:  # one that is not offered, or a mistake, stays with its number
-            return Quantity(tuple(texts), si, units)
-        return Quantity(tuple(number for number, _unit in parts), own, units)
-    converted = [_converted(number, wanted, si) for number, _unit in parts] if wanted != si else [None]
-    if all(text is not None for text in converted):
-        return Quantity(tuple(text or "" for text in converted), wanted, units)
-    return Quantity(tuple(texts), si, units)
+            return Quantity(text, si, units)
+        return Quantity(_with_numbers(text, [number for number, _unit in numbers]), own, units)
+    converted = [_converted(number, wanted, si) for number, _unit in numbers] if wanted != si else [None]
+    if all(converted):
+        return Quantity(_with_numbers(text, [number or "" for number in converted]), wanted, units)
+    return Quantity(text, si, units)
 
 
-def _single(texts: Sequence[str]) -> list[tuple[str, str]] | None:
-    """Number and unit of each text; None where one is neither blank nor a quantity."""
-    found = []
-    for text in texts:
-        match = _NUMBER.fullmatch(text)
-        if text.strip() and match is None:
-            return None
-        found.append((match[1], match[2].strip()) if match else ("", ""))
-    return found
+def _several(text: str) -> list[str]:
+    """The quantities of a text with a list or a range, each with its unit."""
+    written = typed_range(text)
+    if written is None:
+        return with_last_unit(split_list(text))
+    return list(written.numbers)
 
 
-def _listed(texts: Sequence[str]) -> list[tuple[str, str]] | None:
-    """As `_single` for the numbers of a row, of which one is a list."""
-    ends, (listed, limit) = list(texts[:3]), texts[3:]
-    items = [item.strip() for item in listed.split(";") if item.strip()]
-    before = _single([*with_last_unit(ends[:2]), ends[2]])
-    inside = _single(with_last_unit(items))
-    last = _single([limit])
-    if before is None or inside is None or last is None:
-        return None
-    within = {unit for _number, unit in inside}
-    if len(within) > 1:
-        return None
-    return [*before, ("; ".join(number for number, _unit in inside), next(iter(within), "")), *last]
+def _with_numbers(text: str, numbers: Sequence[str]) -> str:
+    """The text with other quantities, in their order."""
+    written = typed_range(text)
+    return "; ".join(numbers) if written is None else written.with_numbers(*numbers).text
 
 
 def _converted(text: str, unit: str, si: str) -> str | None:
-    """A plain number, or a list of them, in another unit; None where that has no short exact text for it."""
-    found = []
-    for item in text.split("; ") if text else ():
-        number = parse_number(item)
-        if number is None:
-            return None
-        try:
-            shown = f"{number / parse_quantity(f'1 {unit}', si):.10g}"
-            if len(shown) > _LONGEST or parse_quantity(f"{shown} {unit}", si) != number:
-                return None
-        except QuantityError:
-            return None
-        found.append(shown)
-    return "; ".join(found)
+    """A plain number in another unit; None where that has no short exact text for it."""
+    number = parse_number(text)
+    if number is None:
+        return None
+    try:
+        shown = f"{number / parse_quantity(f'1 {unit}', si):.10g}"
+        exact = len(shown) <= _LONGEST and parse_quantity(f"{shown} {unit}", si) == number
+    except QuantityError:
+        return None
+    return shown if exact else None

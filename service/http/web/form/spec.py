@@ -4,6 +4,7 @@ are made. Only the spec's reader interprets the fields.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any, Final
 
@@ -22,6 +23,7 @@ from sprag_study.service.http.web.form.machine_spec import Machine
 from sprag_study.service.http.web.form.tolerances import BATCH, FIELDS, Tolerances, with_batch
 from sprag_study.service.http.web.form.walk import Cell, Filled, Record, Rows, chosen, described, typed
 from sprag_study.service.languages import N_, _
+from sprag_study.service.reading.ranges import Spacing, TypedRange, typed_range
 from sprag_study.service.reading.together import with_last_unit
 from sprag_study.service.spec.axes.axes import SWEPT
 from sprag_study.service.spec.axes.sample import SAMPLE, SCALE
@@ -44,21 +46,14 @@ REFINE_DEFAULTS: Final[Values] = {
 GOAL_DEFAULTS: Final[Values] = {
     **dict.fromkeys(("vary", "best"), "1"),
     **dict.fromkeys(("subject_to", "at"), "0"),
-    "/goal/vary/0/way": "from",
     "/goal/best/0/toward": "max",
     "/goal/population": GOAL.described["population"].default_text,
     "/goal/generations": GOAL.described["generations"].default_text,
     "/goal/over": "worst",
     "/goal/polish": "on",
 }
-#: Fields of an axis for each way of giving its values.
-WAYS: Final = {
-    "values": ("values",),
-    "linspace": ("from", "to", "count"),
-    "geomspace": ("from", "to", "count"),
-    "range": ("from", "to", "step"),
-    "adaptive": ("from", "to"),
-}
+#: Entries of an axis that are ranges without a step, and their spacing.
+_SPACINGS: Final[dict[str, Spacing]] = {"linspace": "even", "geomspace": "geometric", "adaptive": "refined"}
 #: Kinds of limits with their labels.
 LIMITS: Final = (("at_most", N_("at most")), ("at_least", N_("at least")), ("is", N_("equal to")))
 #: Kinds of conditions by which cases are left out, with their labels.
@@ -79,6 +74,12 @@ def is_search(values: Mapping[str, str]) -> bool:
     return values.get("asks") == "goal"
 
 
+def is_refined(values: Mapping[str, str]) -> bool:
+    """Whether an axis of a form is refined between two values."""
+    rows = (typed_range(values.get(f"/axes/{row}/values", "")) for row in PARTS["axes"].filled(dict(values)))
+    return any(row is not None and row.spacing == "refined" for row in rows)
+
+
 def _paths(form: Filled) -> dict[str, Any]:
     """The path or the tied paths of what varies; None where there is none."""
     paths = list(filter(None, (form.text("path"), *names_of(form.text("tied")))))
@@ -90,13 +91,60 @@ def _path_fields(item: Mapping[str, Any]) -> Values:
     return {"path": first, "tied": ", ".join(others)}
 
 
-def _listed(way: str) -> Cell:
-    """Values that a list under the name of the way gives: its ends, and their number or step."""
-    names = WAYS[way]
-    return Cell(
-        (way,), names, lambda form: {way: list(form.ranged(names).values())},
-        lambda item: {name: text_of(end) for name, end in zip(names, item[way], strict=True)},
-    )  # fmt: skip
+def with_row_texts(values: Mapping[str, str]) -> Values:
+    """A form whose rows of what varies have their values as one text, also where older pages and drafts have fields for
+    the ends of a range, and its step or count.
+    """
+    found = dict(values)
+    for name in [name for name in values if re.fullmatch(r"/(?:axes|goal/vary)/\d+/way", name)]:
+        row = name.removesuffix("/way")
+        way, *texts, count = (found.pop(f"{row}/{part}", "").strip() for part in ("way", "from", "to", "step", "count"))
+        if way != "values":
+            first, last, step = (text or "?" for text in texts)
+            number = int(count) if way in ("linspace", "geomspace") and count.isdecimal() else None
+            found[f"{row}/values"] = TypedRange(
+                first, last, step if way == "range" else "", number, _SPACINGS.get(way, "even")
+            ).text
+    return found
+
+
+def _range_of(form: Filled) -> TypedRange | None:
+    """The range that the values of a row are; None for a list, and for what is not a range."""
+    return typed_range(form.text("values"))
+
+
+def _axis_values(form: Filled) -> dict[str, Any]:
+    written = _range_of(form)
+    if written is None or (written.count is None and not written.step and written.spacing == "even"):
+        return {"values": form.listed("values")}  # of which the reader of the spec asks how many values it has
+    numbers = form.together(written.numbers, ["values"] * len(written.numbers))
+    counts = [] if written.count is None else [written.count]
+    way = next(way for way, spacing in _SPACINGS.items() if spacing == written.spacing)
+    return {"range" if written.step else way: [*numbers, *counts]}
+
+
+def _axis_text(item: Mapping[str, Any]) -> Values:
+    if "values" in item:
+        return {"values": list_text(item["values"])}
+    way = next((way for way in _AXIS_VALUES.keys if way in item), "")
+    first, last, *more = map(text_of, item[way])
+    if len(more) != (way != "adaptive") or (way in ("linspace", "geomspace") and not more[0].isdecimal()):
+        raise ValueError("the form has no field for this range")
+    step, count = (more[0], None) if way == "range" else ("", int(more[0]) if more else None)
+    return {"values": TypedRange(first, last, step, count, _SPACINGS.get(way, "even")).text}
+
+
+def _variable_values(form: Filled) -> dict[str, Any]:
+    written = _range_of(form)
+    if written is None or written.count is not None or written.step or written.spacing != "even":
+        return {"values": form.listed("values")}
+    return dict(zip(("from", "to"), form.together([written.first, written.last], ["values"] * 2), strict=True))
+
+
+def _variable_text(item: Mapping[str, Any]) -> Values:
+    if "values" in item:
+        return {"values": list_text(item["values"])}
+    return {"values": TypedRange(text_of(item["from"]), text_of(item["to"])).text}
 
 
 def _limit(form: Filled) -> dict[str, Any]:
@@ -247,10 +295,8 @@ _RANGE: Final = Cell(
     ("from", "to"), ("from", "to"), Filled.ranged,
     lambda item: {name: text_of(item[name]) for name in ("from", "to")},
 )  # fmt: skip
-_VALUES: Final = Cell(
-    ("values",), ("values",), lambda form: {"values": form.listed("values")},
-    lambda item: {"values": list_text(item["values"])},
-)  # fmt: skip
+_AXIS_VALUES: Final = Cell(("values", "range", *_SPACINGS), ("values",) * 5, _axis_values, _axis_text)
+_VARIABLE_VALUES: Final = Cell(("values", "from", "to"), ("values",) * 3, _variable_values, _variable_text)
 _RESULT: Final = typed("result", lambda text: text or None, str, always=True)
 _TOWARD: Final = Cell(
     ("max",), ("toward",), lambda form: {"max": True} if form.text("toward", "max") == "max" else {},
@@ -281,16 +327,10 @@ PARTS: Final = {
     rows.name: rows
     for rows in (
         Rows(
-            "axes", "/axes", MAX_AXES,
-            Record(
-                (_PATHS, chosen(SWEPT.name)), {way: _VALUES if way == "values" else _listed(way) for way in WAYS},
-                "/path",
-            ),
-            new={"way": "linspace"},
+            "axes", "/axes", MAX_AXES, Record((_PATHS, _AXIS_VALUES, chosen(SWEPT.name)), whole="/path"),
         ),
         Rows(
-            "vary", "/goal/vary", GOAL.listed["vary"].high, Record((_PATHS,), {"from": _RANGE, "values": _VALUES}),
-            new={"way": "from"},
+            "vary", "/goal/vary", GOAL.listed["vary"].high, Record((_PATHS, _VARIABLE_VALUES), whole="/values"),
         ),
         Rows(
             "best", "/goal/best", GOAL.listed["best"].high, Record((_RESULT, _TOWARD), whole="/result"),
@@ -321,8 +361,7 @@ _GOAL: Final = Record(
 )  # fmt: skip
 _REFINE: Final = Record(
     (typed("results", names_of, "; ".join), *described(REFINE.described.values())), whole="/results", key="refine",
-    when=lambda values: any(values.get(f"/axes/{row}/way") == "adaptive" for row in PARTS["axes"].filled(values)),
-    new=REFINE_DEFAULTS,
+    when=is_refined, new=REFINE_DEFAULTS,
 )  # fmt: skip
 _CASES: Final = Record(
     (_Axes(), PARTS["exclude"], chosen("combine", "grid", always=True), _REFINE),
@@ -334,7 +373,7 @@ _STUDY: Final = Record((typed("name", str), Machine(), _RUN, _BATCH, _GOAL, _CAS
 
 def form_with_spec(values: Mapping[str, str]) -> tuple[dict[str, Any], Filled]:
     """The spec of a filled form, and the form with what cannot be expressed as a spec and the fields of the rest."""
-    form = Filled(dict(values))
+    form = Filled(with_row_texts(values))
     return {"sprag": 1, "model": model_name(values), **_STUDY.value(form)}, form
 
 

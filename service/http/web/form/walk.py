@@ -22,7 +22,7 @@ from sprag_study.service.http.web.form.entries import (
 )
 from sprag_study.service.http.web.form.machine import BASE
 from sprag_study.service.reading.numbers import in_language, settled
-from sprag_study.service.reading.together import with_last_unit, with_unit_of_range
+from sprag_study.service.reading.together import with_last_unit
 from sprag_study.service.spec.described import Described
 from sprag_study.worker.models import form as data
 
@@ -64,12 +64,15 @@ class Filled:
         return entries
 
     def ranged(self, names: Sequence[str] = ("from", "to")) -> dict[str, Any]:
-        """The ends of a range, and its step or count, by name; a unit at the end holds for the bare numbers."""
-        items = settled([in_language(self.text(name)) for name in names])
-        together = with_unit_of_range(*items) if "step" in names else (*with_last_unit(items[:2]), *items[2:])
-        entries = list(map(plain, together))
+        """The ends of a range by the names of their fields."""
+        return dict(zip(names, self.together([self.text(name) for name in names], names), strict=True))
+
+    def together(self, texts: Sequence[str], names: Sequence[str]) -> list[Any]:
+        """The entries for the numbers of a range, each with its field; a unit at the end holds for the bare ones."""
+        items = settled([in_language(text) for text in texts])
+        entries = list(map(plain, with_last_unit(items)))
         self.doubts += doubtful(items, entries, [f"{self.at}/{name}" for name in names], self.text("path"))
-        return dict(zip(names, entries, strict=True))
+        return entries
 
     def show(self, texts: Mapping[str, str]) -> None:
         """Set the texts of fields."""
@@ -179,47 +182,37 @@ def described(entries: Iterable[Described]) -> list[Cell]:
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """An object: ``members``, and behind the first one the cell of the way that its field "way" says.
+    """An object: ``members``.
 
     Attributes
     ----------
-    whole : ends the name of the field for faults of all of it; by default it is the first field of the way
+    whole : ends the name of the field for faults of all of it; None for one that has none
     key : among the members of another object, its entry; "" where its members are those of that object
     when : whether a form has it, which shows it in every case
     new : the fields for none, by default those of an empty one
     """
 
     members: tuple[Member, ...]
-    ways: Mapping[str, Cell] = field(default_factory=dict)
     whole: str | None = None
     key: str = ""
     when: Callable[[Values], bool] = lambda _values: True
     new: Values | None = None
 
-    def _all(self, way: str) -> list[Member]:
-        cells = [self.ways.get(way) or next(iter(self.ways.values()))] if self.ways else []
-        return [*self.members[:1], *cells, *self.members[1:]]
-
     def filled(self, form: Filled) -> bool:
         """As of an `Item`."""
-        cells = (each for each in self._all(form.text("way")) if isinstance(each, Cell) and each.counts)
+        cells = (each for each in self.members if isinstance(each, Cell) and each.counts)
         return any(form.text(name) for cell in cells for name in cell.fields)
 
     def value(self, form: Filled) -> dict[str, Any]:
         """As of an `Item`."""
-        members = self._all(form.text("way"))
         if self.whole is not None:
             form.fields[form.pointer] = form.at + self.whole
-        elif self.ways and isinstance(members[1], Cell):
-            form.fields[form.pointer] = f"{form.at}/{members[1].fields[0]}"
-        return {key: entry for member in members for key, entry in member.entries(form).items()}
+        return {key: entry for member in self.members for key, entry in member.entries(form).items()}
 
     def fill(self, item: Mapping[str, Any], form: Filled) -> None:
         """As of an `Item`."""
-        way = next((way for way, cell in self.ways.items() if cell.keys[0] in item), "")
-        form.show({"way": way} if self.ways else {})
         try:
-            shown = {key for member in self._all(way) for key in member.show(item, form)}
+            shown = {key for member in self.members for key in member.show(item, form)}
         except KeyError:
             shown = set()
         if not set(item) <= shown:

@@ -8,6 +8,7 @@ let old = false; // the panel is out of date; it is requested again once the con
 let redrawn = false; // the form was made again for its drawings
 let whole = false; // after a full check, empty required fields are reported too
 
+let typed = ""; // name of a field that was left with another text: several values in it vary, and a refinement has fields of its own
 let edited = ""; // name of the field that was changed last: what is wrong with a whole part is shown beside it
 
 const encoded = (extra = []) => new URLSearchParams([...new FormData(form), ["edited", edited], ...extra]);
@@ -41,7 +42,7 @@ const fail = (text) => {
 const reveal = (element) => { for (let part = element; (part = part.parentElement?.closest("details"));) part.open = true; };
 
 const check = async () => {
-  const mine = ++latest, panel = document.getElementById("panel");
+  const mine = ++latest, left = typed, panel = document.getElementById("panel");
   old = true;
   panel.classList.toggle("stale", panel.querySelector("[data-cases]") !== null); // until it matches the current input
   let found = null;
@@ -86,6 +87,9 @@ const check = async () => {
   panel.querySelectorAll("details").forEach((part, index) => { part.open = Boolean(open[index]); });
   for (const place of form.querySelectorAll(".fit")) place.innerHTML = found.fits[place.id.slice("fit:".length)] || "";
   form.dataset.checked = String(mine);
+  if (!left || document.activeElement.name === left) return;
+  typed = typed === left ? "" : typed;
+  if (found.rows !== form.querySelector("section.varies").dataset.rows) reshape([]);
   document.dispatchEvent(new Event("sprag:checked"));
 };
 
@@ -122,28 +126,34 @@ const reshape = async (extra) => {
 };
 
 // After a button: the first new field, the same button, or the one beside it where it has nothing left to do. After a choice: the choice.
-const focusAfter = (asked, known, chosen, type) => {
+const focusAfter = (asked, known, { name: chosen, type, value, id }) => {
   const button = (value) => form.querySelector(`button[value="${CSS.escape(value)}"]:enabled`);
   const first = [...form.elements].find((element) => element.id && !known.has(element.id) && !element.matches("fieldset"));
   const same = asked ? [asked, asked.replace(/^drop-(\S+).*/, "add-$1"), "check"].map(button).find(Boolean)
-    : chosen ? form.querySelector(`[name="${CSS.escape(chosen)}"]${type === "radio" ? ":checked" : ""}`) : null;
+    : chosen ? form.querySelector(`[name="${CSS.escape(chosen)}"]${type === "radio" ? ":checked" : type === "submit" ? `[value="${CSS.escape(value)}"]` : ""}`)
+    : id ? document.getElementById(id) : null;
   (asked ? first || same : same)?.focus();
 };
 
+const MOST_ASKED = 4;
 // Whether the form has come.
-const newShape = async (extra, body = encoded(extra)) => {
-  clearTimeout(waiting);
-  latest += 1;
-  let answer = null;
+const newShape = async (extra, draft = null) => {
+  let answer = null, body = null;
+  const current = () => String(draft ?? encoded(extra));
   try {
-    answer = await sprag.fetch(form.action, { method: "POST", body, headers: { Accept: "text/html" } });
+    for (let asked = 0; asked < MOST_ASKED && body !== current(); asked += 1) { // again with what was typed or ticked meanwhile
+      clearTimeout(waiting);
+      latest += 1;
+      body = current();
+      answer = await sprag.fetch(form.action, { method: "POST", body: new URLSearchParams(body), headers: { Accept: "text/html" } });
+    }
   } catch (error) { return false; } // the bar reports it; the input is kept
   if (answer.status === 401) { ended(); return false; }
   const page = new DOMParser().parseFromString(await answer.text(), "text/html");
   const fresh = page.getElementById("study-form");
   if (!fresh) { fail(page.querySelector("main p")?.textContent || sprag.refusal(answer)); return false; }
   const known = new Set([...form.elements].map((element) => element.id || element.value));
-  const { name: chosen, type } = document.activeElement;
+  const before = document.activeElement;
   const named = (part) => part.id || `${part.closest("fieldset[id]")?.id} ${part.querySelector("summary").textContent}`;
   const added = [...fresh.querySelectorAll(".fold")].some((part) => !document.getElementById(part.id)); // which alone is open
   const opened = new Set([...form.querySelectorAll(`details[open]${added ? ":not(.fold)" : ""}`)].map(named));
@@ -153,7 +163,7 @@ const newShape = async (extra, body = encoded(extra)) => {
   form = fresh;
   for (const part of form.querySelectorAll("details")) part.open ||= opened.has(named(part));
   listen();
-  focusAfter(extra[0]?.[1], known, chosen, type);
+  focusAfter(extra[0]?.[1], known, before);
   const unused = form.querySelector('[id="wrong:/columns"]');
   if (unused?.textContent) unused.closest("details").scrollIntoView({ block: "nearest" });
   else if (!whole) check();
@@ -176,7 +186,7 @@ const explain = (event) => {
 
 // A dimension is one stop of the Tab key: Enter opens its unit and its ticks, Escape leads back.
 const GROUPS = ".dim, .axis .line";
-const ownOf = (group) => [...group.querySelectorAll("a.range, .entry:not(.tolerance) > input, .line > .way > input")];
+const ownOf = (group) => [...group.querySelectorAll("a.range, .entry:not(.tolerance) > input:not([type=hidden])")];
 const othersOf = (group) => {
   const all = group.matches(".line") ? group.closest(".axis") : group;
   return [...all.querySelectorAll("select, summary, button, input:not([type=hidden])")].filter((one) => !ownOf(group).includes(one) && !one.closest("details:not([open]) > .fields"));
@@ -246,6 +256,7 @@ function listen() {
   form.addEventListener("keydown", open);
   form.addEventListener("focusout", left);
   form.addEventListener("focusout", (event) => { if (event.target.name) { touched.add(event.target.name); soon(); } });
+  form.addEventListener("change", (event) => { if (event.target.matches(":is(.dim, .axis) .entry > input")) typed = event.target.name; });
   form.addEventListener("change", (event) => { if (event.target.matches("[data-shape]")) reshape([]); });
   form.addEventListener("change", takeFile);
   form.addEventListener("submit", (event) => {

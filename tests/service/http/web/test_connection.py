@@ -58,10 +58,10 @@ def test_an_old_picture_is_pale_under_a_new_choice_until_it_is_drawn(visitor: Vi
 def test_the_form_does_not_keep_old_costs(visitor: Visitor) -> None:
     page = visitor.page
     page.goto("/new?preset=one_pendulum")
-    named(page, "/axes/0/count").fill("10")
+    named(page, "/axes/0/values").fill("20 to 35 in 10")
     expect(page.locator("[data-cases]")).to_have_text("320")
     cut(page)
-    named(page, "/axes/0/count").fill("20")
+    named(page, "/axes/0/values").fill("20 to 35 in 20")
     expect(page.get_by_role("alert").filter(has_text=LOST)).to_be_visible()
     expect(page.locator("#panel")).to_have_class(re.compile("stale"))
     mend(page)
@@ -74,7 +74,7 @@ def test_a_refusal_of_the_form_is_told(visitor: Visitor) -> None:
     page.goto("/new?preset=one_pendulum")
     expect(page.locator("[data-cases]")).to_have_count(1)
     page.route("**/new/check", lambda route: route.fulfill(status=500, json={"detail": "A fault of the program."}))
-    named(page, "/axes/0/count").fill("20")
+    named(page, "/axes/0/values").fill("20 to 35 in 20")
     expect(page.locator("#panel [role=alert]")).to_contain_text("A fault of the program.")
     expect(page.locator("#panel .cost")).to_have_count(0)
 

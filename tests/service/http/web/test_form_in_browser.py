@@ -41,7 +41,6 @@ def test_what_is_typed_and_what_is_added_is_undone(visitor: Visitor) -> None:
 def test_columns_of_a_spreadsheet_are_pasted_into_an_axis(visitor: Visitor) -> None:
     page = visitor.page
     page.goto("/new?preset=one_pendulum")
-    page.evaluate("document.getElementById('/axes/0/way').value = 'values'")
     text = "shaft.load [N*mm]\texcitation.frequency [Hz]\n50\t24\n100,5\t25\n"
     page.evaluate(_PASTE, ["/axes/0/values", text])
     expect(named(page, "/axes/1/values")).to_have_value("24; 25")

@@ -73,7 +73,7 @@ REFINED = changed(
 
 def test_a_refined_study_is_cloned_with_all_that_it_asks_for() -> None:
     values = values_of(json.loads(json.dumps(REFINED)))
-    assert (values["/axes/1/way"], values["/axes/1/from"], values["/axes/1/to"]) == ("adaptive", "0", "1.2 N*m")
+    assert values["/axes/1/values"] == "0 to 1.2 N*m refined"
     again, faults = spec_of(values)
     assert faults == {}
     assert again["refine"] == REFINED["refine"]
@@ -100,9 +100,9 @@ def test_an_axis_that_is_refined_asks_for_results_and_an_error() -> None:
         ("/refine/start", "16", "power of 2"),
         ("/refine/finest", "1/100", "power of 2"),
         ("/refine/most", "1", "out of range"),
-        ("/axes/1/to", "", "must begin with a number"),
-        ("/axes/1/from", "0 mm", "not a unit of this field"),
-        ("/axes/1/from", "1.2 N*m", "begins where it ends"),
+        ("/axes/1/values", "? to 1.2 N*m", "must begin with a number"),
+        ("/axes/1/values", "0 mm to 1.2 N*m refined", "not a unit of this field"),
+        ("/axes/1/values", "1.2 to 1.2 N*m refined", "begins where it ends"),
     ],
 )
 def test_each_fault_of_a_refinement_stands_beside_its_field(name: str, text: str, message: str) -> None:
@@ -196,8 +196,9 @@ def filled(**changes: str) -> dict[str, str]:
         ("/base/clutch/coefficients", "0; -200", "negative"),
         ("/base/clutch/coefficients", "", "is required"),
         ("/base/gravity", "much", "must begin with a number"),
-        ("/axes/0/count", "0", "out of range"),
-        ("/axes/0/from", "16 mm", "not a unit of this field"),
+        ("/axes/0/values", "20 to 35 in 0", "out of range"),
+        ("/axes/0/values", "20 to 35", "in which steps, or how many values"),
+        ("/axes/0/values", "16 mm to 35 Hz in 4", "not a unit of this field"),
         ("/axes/1/values", "1,500 mm", "decimal point"),
         ("/axes/2/path", "shaft.lod", "shaft.load"),
         ("/run/tolerance", "1", "out of range"),
@@ -242,8 +243,8 @@ def test_an_empty_form_asks_for_settled_motion_and_the_other_choice_for_60_perio
 
 
 def test_axes_that_are_not_filled_in_do_not_shift_the_faults() -> None:
-    values = {"axes": "2", "/axes/1/path": "shaft.load", "/axes/1/way": "range"}
-    assert field_of("/axes/0/range/2", values) == "/axes/1/step"
+    values = {"axes": "2", "/axes/1/path": "shaft.load", "/axes/1/values": "0 to 1 step 0.1"}
+    assert field_of("/axes/0/range/2", values) == "/axes/1/values"
     assert field_of("/axes/0", values) == "/axes/1/path"
     assert field_of("/axes", values) == "/axes"
 

@@ -69,9 +69,9 @@ def test_a_search_is_cloned_with_all_that_it_asks_for() -> None:
     [
         ("/goal/vary/0/path", "excitation.frequenc", "excitation.frequency"),
         ("/goal/vary/0/path", "", "required"),
-        ("/goal/vary/0/from", "20 mm", "not a unit of this field"),
-        ("/goal/vary/0/to", "", "must begin with a number"),
-        ("/goal/vary/0/from", "35 Hz", "begins where it ends"),
+        ("/goal/vary/0/values", "20 mm to 35 Hz", "not a unit of this field"),
+        ("/goal/vary/0/values", "? to 35 Hz", "must begin with a number"),
+        ("/goal/vary/0/values", "35 Hz to 35 Hz", "begins where it ends"),
         ("/goal/vary/1/values", "1 mm; 2 kg", "not a unit of this field"),
         ("/goal/vary/1/values", "", "has no values"),
         ("/goal/best/0/result", "eficiency", "efficiency"),
@@ -98,10 +98,10 @@ def test_each_fault_of_a_search_stands_beside_its_field(name: str, text: str, me
 
 
 def test_rows_that_are_not_filled_in_do_not_shift_the_faults() -> None:
-    values = {"asks": "goal", "vary": "2", "/goal/vary/0/way": "from", "/goal/vary/1/path": "shaft.load"}
+    values = {"asks": "goal", "vary": "2", "/goal/vary/1/path": "shaft.load"}
     values |= {"subject_to": "3", "/goal/subject_to/2/value": "3", "at": "2", "/goal/at/1/path": "gravity"}
     assert field_of("/goal/vary/0/path", values) == "/goal/vary/1/path"
-    assert field_of("/goal/vary/0", values) == "/goal/vary/1/from"
+    assert field_of("/goal/vary/0", values) == "/goal/vary/1/values"
     assert field_of("/goal/subject_to/0/at_most", values) == "/goal/subject_to/2/value"
     assert field_of("/goal/at/0/gravity", values) == "/goal/at/1/values"
     assert [field_of(pointer, values) for pointer in ("/goal", "/goal/vary", "/goal/seed")] == [

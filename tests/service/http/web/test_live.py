@@ -143,7 +143,7 @@ def test_every_kind_of_page_outlives_a_stop_of_the_service(
         service.app.state.context.ending.set()  # as a service that is stopped ends its streams
     for name, page in pages.items():
         if name == "form":
-            page.locator('[name="/axes/0/count"]').fill("7")  # learns it from its next request
+            page.locator('[name="/axes/0/values"]').fill("20 to 35 in 7")  # learns it from its next request
         expect(page.get_by_role("alert").filter(has_text=LOST)).to_be_visible()
     with in_process(settings, connect) as service, served(service.app, port):
         service.submit({**SPEC, "name": "After"})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import pytest
 from playwright.sync_api import expect
@@ -16,6 +16,7 @@ from sprag_study.service.http.web.form.spec import spec_of, values_of
 from sprag_study.service.spec.document import parse_spec
 from tests.service.http.web.controls import Controls
 from tests.service.http.web.fields import named
+from tests.service.http.web.walking import Keys
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -39,24 +40,24 @@ WORDS: Final = r"""() => {
 
 
 @pytest.mark.parametrize(
-    ("texts", "si", "choice", "shown"),
+    ("text", "si", "choice", "shown"),
     [
-        (["30 mm"], "m", "typed", (("30",), "mm")),
-        (["0.03"], "m", "typed", (("30",), "mm")),
-        (["0.03"], "m", "si", (("0.03",), "m")),
-        (["0.005"], "rad", "typed", (("0.005",), "rad")),  # has no short text in degrees
-        (["1500 rpm"], "Hz", "typed", (("1500",), "rpm")),
-        (["2 ft"], "m", "typed", (("2 ft",), "m")),
-        (["1500 1/min"], "Hz", "typed", (("1500 1/min",), "Hz")),
-        (["2 mm"], "kg*m^2", "typed", (("2 mm",), "kg*m^2")),
-        (["= 2 * shaft.load"], "N*m", "typed", (("= 2 * shaft.load",), "N*m")),
-        ([""], "m", "typed", (("",), "mm")),
-        (["4"], "1", "typed", (("4",), "")),
+        ("30 mm", "m", "typed", ("30", "mm")),
+        ("0.03", "m", "typed", ("30", "mm")),
+        ("0.03", "m", "si", ("0.03", "m")),
+        ("0.005", "rad", "typed", ("0.005", "rad")),  # has no short text in degrees
+        ("1500 rpm", "Hz", "typed", ("1500", "rpm")),
+        ("2 ft", "m", "typed", ("2 ft", "m")),
+        ("1500 1/min", "Hz", "typed", ("1500 1/min", "Hz")),
+        ("2 mm", "kg*m^2", "typed", ("2 mm", "kg*m^2")),
+        ("= 2 * shaft.load", "N*m", "typed", ("= 2 * shaft.load", "N*m")),
+        ("", "m", "typed", ("", "mm")),
+        ("4", "1", "typed", ("4", "")),
     ],
 )
-def test_the_unit_of_a_field(texts: list[str], si: str, choice: str, shown: tuple[tuple[str, ...], str]) -> None:
-    found = quantity_of(texts, si, preferred(choice, "vibration-drive"))
-    assert (found.texts, found.unit) == shown
+def test_the_unit_of_a_field(text: str, si: str, choice: str, shown: tuple[str, str]) -> None:
+    found = quantity_of(text, si, preferred(choice, "vibration-drive"))
+    assert (found.text, found.unit) == shown
 
 
 def test_a_unit_says_that_it_leaves_the_number(service: Service) -> None:
@@ -66,11 +67,79 @@ def test_a_unit_says_that_it_leaves_the_number(service: Service) -> None:
     assert all('data-help="Another unit leaves the number as it is."' in one for one in units)
 
 
-def test_a_row_has_one_unit() -> None:
-    found = quantity_of(["0", "400 N*mm", "", "1; 2; 5 N*mm", ""], "N*m", {}, listed=True)
-    assert (found.texts, found.unit) == (("0", "400", "", "1; 2; 5", ""), "N*mm")
-    mixed = ["0.1 N*m", "400 N*mm", "", "", ""]
-    assert quantity_of(mixed, "N*m", {}, listed=True).texts == tuple(mixed)
+@pytest.mark.parametrize(
+    ("text", "shown", "unit"),
+    [
+        ("0 to 400 N*mm in 9", "0 to 400 in 9", "N*mm"),
+        ("0..400 N*mm step 100", "0 to 400 step 100", "N*mm"),
+        ("1; 2; 5 N*mm", "1; 2; 5", "N*mm"),
+        ("0 to 0.4 in 9", "0 to 400 in 9", "N*mm"),
+        ("0.1; 0.2", "100; 200", "N*mm"),
+        ("0.1 N*m to 400 N*mm in 4", "0.1 N*m to 400 N*mm in 4", "N*m"),
+        ("0 to much", "0 to much", "N*m"),
+        ("", "", "N*mm"),
+    ],
+)
+def test_a_row_has_one_unit(text: str, shown: str, unit: str) -> None:
+    found = quantity_of(text, "N*m", {"N*m": "N*mm"}, listed=True)
+    assert (found.text, found.unit) == (shown, unit)
+
+
+@pytest.mark.parametrize(
+    ("text", "entry"),
+    [
+        ("20 to 60 in 11", {"linspace": ["20 rpm", "60 rpm", 11]}),
+        ("20..60 step 4", {"range": ["20 rpm", "60 rpm", "4 rpm"]}),
+        ("від 20 до 60 через 4", {"range": ["20 rpm", "60 rpm", "4 rpm"]}),
+        ("20 до 60, 11 значень", {"linspace": ["20 rpm", "60 rpm", 11]}),
+        ("1 to 100 in 5 geometric", {"geomspace": ["1 rpm", "100 rpm", 5]}),
+        ("20 to 60 refined", {"adaptive": ["20 rpm", "60 rpm"]}),
+        ("20 до 60 з уточненням", {"adaptive": ["20 rpm", "60 rpm"]}),
+        ("0.1; 0.2; 0.5", {"values": ["0.1 rpm", "0.2 rpm", "0.5 rpm"]}),
+        ("0,1 to 0,5 Hz in 3", {"linspace": ["0.1 Hz", "0.5 Hz", 3]}),
+        ("20", {"values": ["20 rpm"]}),
+    ],
+)
+def test_values_are_written_as_people_write_them(text: str, entry: dict[str, Any]) -> None:
+    """Beside an axis, and at the number itself, which varies then."""
+    path, unit = "excitation.frequency", {"unit:/axes/0": "rpm"}
+    values = DRIVE | {"axes": "1", "/axes/0/path": path, "/axes/0/values": text, **unit}
+    settle(values)
+    assert spec_of(values)[0]["axes"] == [{"path": path, **entry}]
+    again = values_of(spec_of(values)[0])
+    assert spec_of(again)[0]["axes"] == [{"path": path, **entry}]
+    typed = DRIVE | {"/base/excitation/frequency": text, "unit:/base/excitation/frequency": "rpm", "ticks:axes": path}
+    settle(typed)
+    assert spec_of(typed)[0]["axes"] == ([] if text == "20" else [{"path": path, **entry}])
+
+
+def test_a_number_that_varies_no_longer_has_the_first_of_its_values() -> None:
+    values = DRIVE | {"/base/shaft/load": "0.1 to 0.4 N*m in 4", "ticks:axes": "shaft.load"}
+    settle(values)
+    assert (values["axes"], values["/base/shaft/load"]) == ("1", "0.1 N*m")
+    values |= {"ticks:axes": "shaft.load"}
+    settle(values)
+    assert (values["axes"], values["/base/shaft/load"]) == ("0", "0.1 N*m")
+
+
+@pytest.mark.parametrize(
+    ("old", "text"),
+    [
+        ({"way": "linspace", "from": "20", "to": "35", "count": "4"}, "20 to 35 in 4"),
+        ({"way": "geomspace", "from": "20", "to": "35 Hz", "count": "4"}, "20 to 35 Hz in 4 geometric"),
+        ({"way": "range", "from": "20", "to": "35", "step": "5", "count": "9"}, "20 to 35 step 5"),
+        ({"way": "adaptive", "from": "20", "to": "35", "count": "9"}, "20 to 35 refined"),
+        ({"way": "values", "values": "20; 35", "from": "1"}, "20; 35"),
+        ({"way": "linspace", "from": "", "to": "35", "count": "many"}, "? to 35"),
+    ],
+)
+def test_the_ends_of_older_pages_and_drafts_are_one_text(old: dict[str, str], text: str) -> None:
+    values = DRIVE | {"axes": "1", "/axes/0/path": "excitation.frequency"}
+    values |= {f"/axes/0/{name}": part for name, part in old.items()}
+    settle(values)
+    assert {name: values[name] for name in values if name.startswith("/axes/0/")} == {
+        "/axes/0/path": "excitation.frequency", "/axes/0/values": text,
+    }  # fmt: skip
 
 
 def test_what_is_shown_is_sent_back_unchanged(service: Service) -> None:
@@ -89,9 +158,9 @@ def test_ticks_let_numbers_vary_and_stop_it() -> None:
     assert (values["axes"], values["/axes/0/path"], values["/axes/1/path"]) == (
         "2", "shaft.load", "excitation.amplitude_x",
     )  # fmt: skip
-    assert (values["/axes/0/from"], values["/axes/0/to"], values["/axes/0/count"]) == ("0", "0.8", "9")
+    assert values["/axes/0/values"] == "0 to 0.8 in 9"
     again = dict(values) | {"alikes:/axes/1": "excitation.amplitude_y", "alike:/axes/1": "on", "unit:/axes/1": "mm"}
-    again |= {"/axes/1/from": "1", "/axes/1/to": "3", "ticks:axes": "shaft.load excitation.amplitude_x"}
+    again |= {"/axes/1/values": "1 to 3 in 9", "ticks:axes": "shaft.load excitation.amplitude_x"}
     settle(again | {})
     sent = {**again, "vary:excitation.amplitude_x": "on"}
     settle(sent)
@@ -170,12 +239,12 @@ def test_a_drive_of_ones_own_with_three_axes(visitor: Visitor, office: Office) -
         expect(page.locator(f'[name="vary:{path}"]')).to_be_checked()
         expect(page.locator(".varies legend")).to_have_count(1 + (actions - 3) // 1)
         actions += 1
-    named(page, "/axes/0/to").fill("1.6")
-    named(page, "/axes/1/count").fill("3")
-    named(page, "/axes/2/count").fill("3")
+    named(page, "/axes/0/values").fill("0 to 1.6 in 9")
+    named(page, "/axes/1/values").fill("1 to 3 in 3")
+    named(page, "/axes/2/values").fill("15; 30; 60")
     actions += 3
     expect(page.locator("#go")).to_contain_text("Run 81 cases")
-    assert stops(page) <= 20 + 3 * 3, "each axis has two ends and a number of values"
+    assert stops(page) <= 20, "the field of an axis stands for that of its number"
     assert page.evaluate(WORDS) <= 300
     page.locator("#go").click()
     actions += 1
@@ -209,16 +278,13 @@ def test_what_varies_stands_beside_its_number_as_it_is_typed(visitor: Visitor) -
     tick = page.locator('[name="vary:excitation.frequency"]')
     tick.focus()
     page.keyboard.press("Space")
-    first = named(page, "/axes/0/from")
+    first = named(page, "/axes/0/values")
     expect(first).to_be_visible()
     page.locator("a.range").focus()
     page.keyboard.press("Enter")
     expect(first).to_be_focused()
-    page.keyboard.type("20")
+    page.keyboard.type("20 to 35 in 4")
     page.keyboard.press("Tab")
-    page.keyboard.type("35")
-    page.keyboard.press("Tab")
-    expect(named(page, "/axes/0/count")).to_be_focused()
     expect(page.locator("a.range")).to_have_text("20 … 35 Hz")
     expect(page.locator(".dim.varies .wrong:not(:empty)")).to_have_count(0)
     row, machine = page.locator(".varies .axis").bounding_box(), page.locator(".machine").bounding_box()
@@ -226,6 +292,35 @@ def test_what_varies_stands_beside_its_number_as_it_is_typed(visitor: Visitor) -
     assert machine is not None
     assert row["x"] > machine["x"] + machine["width"], "beside the machine, where the tick is seen"
     assert row["y"] < 300
+
+
+def test_the_whole_task_by_keys_alone(visitor: Visitor, office: Office) -> None:
+    """Several values at a number let it vary, and the focus goes on to the next number."""
+    page = visitor.page
+    page.goto("/new")
+    keys = Keys(page)
+    keys.type(named(page, "/base/excitation/frequency"), "20 to 30 in 3")
+    page.keyboard.press("Tab")
+    expect(named(page, "/axes/0/values")).to_have_value("20 to 30 in 3")
+    expect(page.locator("a.range")).to_have_text("20 … 30 Hz")
+    expect(named(page, "/base/excitation/amplitude_x")).to_be_focused()
+    keys.type(named(page, "/base/pendulums/0/arm"), "36 to 40 step 2")
+    page.keyboard.press("Tab")
+    expect(named(page, "/axes/1/values")).to_have_value("36 to 40 step 2")
+    keys.type(named(page, "/base/shaft/load"), "0; 100; 200 N*mm")
+    page.keyboard.press("Tab")
+    expect(named(page, "unit:/axes/2")).to_have_value("N*mm")
+    expect(page.locator('button[value="add-pendulums"]')).to_be_focused()
+    expect(page.locator("#go")).to_contain_text("Run 27 cases")
+    assert stops(page) <= 20
+    keys.reach(named(page, "/axes/1/values"))
+    page.keyboard.press("Enter")
+    keys.use(page.locator('button[value="drop-axes 1"]'))
+    expect(page.locator("#go")).to_contain_text("Run 9 cases")
+    keys.use(page.locator("#go"))
+    page.wait_for_url("**/studies/st_*")
+    axes = office.get(f"/studies/{page.url.rpartition('/')[2]}")["spec"]["axes"]
+    assert [axis["path"] for axis in axes] == ["excitation.frequency", "shaft.load"]
 
 
 def test_the_machine_moves_while_it_is_drawn(visitor: Visitor) -> None:
@@ -257,7 +352,10 @@ def test_its_motion_is_shown_without_scripts(visitor: Visitor) -> None:
     expect(page.locator(".live-figure svg")).to_be_visible()
     page.locator('[name="vary:shaft.load"]').check()
     page.get_by_role("button", name="Apply the ticks").click()
-    expect(named(page, "/axes/0/to")).to_have_value("0.4")
+    expect(named(page, "/axes/0/values")).to_have_value("0 to 0.4 in 9")
+    named(page, "/base/pendulums/0/arm").fill("20 to 40 in 3")
+    page.get_by_role("button", name="Apply the ticks").click()
+    expect(named(page, "/axes/1/values")).to_have_value("20 to 40 in 3")
 
 
 def test_enter_opens_the_unit_of_a_dimension(visitor: Visitor) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 import pytest
@@ -42,8 +43,8 @@ def test_a_study_of_the_model_from_its_numbers_to_its_case(service: Service, ope
     page.goto(f"/new?model={NAME}&body.spring_rate=1.5")
     expect(page.locator(".live-figure svg")).to_be_visible()
     page.locator('[name="vary:damping"]').check()
-    expect(named(page, "/axes/0/count")).to_have_value("9")
-    fill(page, {"/axes/0/from": "0", "/axes/0/to": "0.8", "/axes/0/count": "3"})
+    expect(named(page, "/axes/0/values")).to_have_value(re.compile(" in 9$"))
+    fill(page, {"/axes/0/values": "0 to 0.8 in 3"})
     page.locator("#go").click()
     page.wait_for_url("**/studies/st_*")
     study_id = page.url.rpartition("/")[2]

@@ -102,7 +102,7 @@ def walk(hand: Hand, name: str, file: Path) -> str:
     hand.use(page.locator('.menu a[href$="preset=one_pendulum"]'))
     hand.arrive("**/new?preset=one_pendulum")
     hand.type(page.locator('[name="/name"]'), name)
-    hand.type(page.locator('[name="/axes/0/count"]'), "2")
+    hand.type(page.locator('[name="/axes/0/values"]'), "20 to 35 in 2")
     hand.type(page.locator('[name="/axes/1/values"]'), "2")
     hand.type(page.locator('[name="/axes/2/values"]'), "0; 0.1")
     expect(page.locator("[data-cases]")).to_have_text("4")
