@@ -9,7 +9,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any
@@ -27,8 +27,6 @@ from sprag_study.worker.limits import MAX_TOLERANCE, MIN_TOLERANCE
 _LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "sqlalchemy", "fastapi", "uvicorn")
 #: Default shape of the kernel to print.
 _KERNEL = {"pendulums": 1, "coefficients": 4, "tolerance": 1e-9}
-#: Backups are made every night.
-_OLD_BACKUP = timedelta(hours=49)
 
 
 @dataclass(frozen=True, slots=True)
@@ -291,7 +289,7 @@ def _disk(location: Path) -> tuple[bool, str]:
 
 
 def _backups() -> tuple[bool, str]:
-    from sprag_study.service.jobs.maintenance import backups
+    from sprag_study.service.jobs.maintenance import OLDEST_BACKUP, backups
 
     folder = read_settings().backup_folder
     if not folder:
@@ -304,7 +302,7 @@ def _backups() -> tuple[bool, str]:
     age = datetime.now(UTC) - found[-1][0]
     hours = round(age.total_seconds() / 3600)
     text = _("{count} in {folder}, the latest {hours} hours old", count=len(found), folder=folder, hours=hours)
-    return age < _OLD_BACKUP, text
+    return age < OLDEST_BACKUP, text
 
 
 def _cache() -> tuple[bool, str]:

@@ -38,6 +38,8 @@ _LOG = logging.getLogger("sprag.maintenance")
 #: Seconds between two checks of the clock, and before a failed task is retried.
 LOOK_SECONDS = 20.0
 AGAIN = timedelta(minutes=10)
+#: Backups are made every night: the latest one is no older.
+OLDEST_BACKUP: Final = timedelta(hours=49)
 #: For so long the reports of schedules are kept after they were sent or given up.
 REPORTS_KEPT: Final = timedelta(days=90)
 _NAME: Final = re.compile(r"sprag-(\d{8}T\d{6}Z)\.sqlite3")

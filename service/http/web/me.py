@@ -41,6 +41,7 @@ from sprag_study.service.http.web.deployment import (
 from sprag_study.service.http.web.form.values import Form
 from sprag_study.service.http.web.templates import page
 from sprag_study.service.http.web.way_in import within
+from sprag_study.service.jobs.maintenance import OLDEST_BACKUP
 from sprag_study.service.jobs.reports.channels import DeliveryError
 from sprag_study.service.jobs.reports.trial import try_mail, try_webhook
 from sprag_study.service.jobs.users import user_json
@@ -276,11 +277,13 @@ def _settings(context: Context, status: int = 200, **shown: Any) -> Response:
 def workers(context: Ctx) -> Response:
     """The dispatchers and their workers, as they last reported them, how schedules fare, and the backups."""
     store, folder = context.store, context.settings.backup_folder
+    made = backups_listed(folder)
     return page(
         "workers.html",
         parts=_parts(),
         found=worker_list(store.dispatchers),
-        backups=backups_listed(folder),
+        backups=made,
+        old=bool(made) and store.clock.now() - made[0][0] > OLDEST_BACKUP,
         folder=folder,
         making=is_being_backed_up(),
         on_server=store.session.on_server,

@@ -8,12 +8,13 @@ import time
 from collections.abc import Callable
 from datetime import timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import httpx
 import pytest
 from pydantic import SecretStr
 
+from sprag_study.service.http.web import me
 from sprag_study.service.http.web.deployment import schedule_health
 from sprag_study.service.jobs import nights
 from sprag_study.service.jobs.settings_log import note_settings
@@ -29,6 +30,13 @@ from tests.service.timed_spec import SPEC
 
 if TYPE_CHECKING:
     from tests.service.conftest import Service
+
+
+WORKING: Final[dict[str, object]] = {
+    **dict.fromkeys(("ended_at", "silent", "shortage", "differs", "scheduler", "dashboard")), "owner": "one",
+    "hosts": [], "refused": [], "fingerprint": "0" * 12, "studies": 0, "started_at": "2027-01-31T06:00:00Z",
+    "heartbeat_at": "2027-01-31T06:00:00Z",
+}  # fmt: skip
 
 
 @pytest.fixture
@@ -104,6 +112,32 @@ def test_without_a_folder_there_is_no_backup(opened: Callable[..., Office]) -> N
     ada = opened().program("ada")
     assert "Make a backup now" not in ada.get("/me/workers").text
     assert ada.post("/me/backups", headers=OWN).status_code == 404
+
+
+def test_the_page_begins_with_what_needs_attention(
+    opened: Callable[..., Office], service: Service, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ada, now = opened(backup_folder=str(tmp_path)).program("ada"), service.store.clock.now()
+
+    def attention() -> str:
+        page = ada.get("/me/workers").text
+        return page.partition('id="alerts"')[2].partition('id="workers"')[0]
+
+    def backup(age: timedelta) -> None:
+        (tmp_path / f"sprag-{now - age:%Y%m%dT%H%M%SZ}.sqlite3").touch()
+
+    assert "There is no backup" in attention()
+    backup(timedelta(days=3))
+    assert "though the worker makes one every night" in attention()
+    backup(timedelta(hours=3))
+    assert "every night" not in attention()
+    assert "<code>sprag serve</code> starts one" in attention(), "and what to do"
+    assert "All is well." not in attention()
+    monkeypatch.setattr(me, "worker_list", lambda _: {"usable": 2, "chunks_in_flight": 0, "dispatchers": [WORKING]})
+    assert "All is well." in attention()
+    refused = {**WORKING, "refused": [{"address": "10.0.0.2", "reason": "another version"}]}
+    monkeypatch.setattr(me, "worker_list", lambda _: {"usable": 2, "chunks_in_flight": 0, "dispatchers": [refused]})
+    assert "another version" in attention()
 
 
 def test_the_page_says_how_schedules_fare(service: Service) -> None:
