@@ -61,7 +61,7 @@ def _row(
         _jump(motion, part, clutch, peak),
         max((row.impact_speed for row in begun), default=0.0),
         _most(overrun),
-        max(0.0, -_most(-windup)) if len(windup) else 0.0,
+        max(0.0, -float(np.max(largest(-windup)))) if len(windup) else 0.0,
         _most(windup),
         float(motion.losses[clutch]) * _HOUR,
         sum(each.number for each in counted) / hours,

@@ -19,7 +19,7 @@ from sprag_study.engine.vibration_drive.engagements import engagements
 from sprag_study.engine.vibration_drive.examined import Examined, examined, examined_settled
 from sprag_study.engine.vibration_drive.pieces import extremes
 from sprag_study.engine.vibration_drive.rainflow_counts import Cycle, cycles, equivalent, spectrum
-from tests.engine.vibration_drive.drive import Columns, drive, one, periods
+from tests.engine.vibration_drive.drive import Columns, clutch, drive, one, pendulum, periods
 from tests.engine.vibration_drive.reference_equations import Floats
 from tests.engine.vibration_drive.reference_run import TORQUE_STATES, Drive
 from tests.engine.vibration_drive.test_drag import damped, free_pair
@@ -224,3 +224,28 @@ def test_duty_is_that_of_an_independent_integration(columns: Columns) -> None:
             own = sum(cycle.count * cycle.range**power for cycle in counted if cycle.range > 0.01 * bears.torque_max)
             other = sum(count * size**power for size, count in sampled if size > 0.01 * bears.torque_max)
             assert own == pytest.approx(other, rel=1e-5)
+
+
+def test_a_clutch_that_never_lets_go_has_the_range_of_its_windup() -> None:
+    """Its windup is known from the state in which the part begins."""
+    pressed = drive(
+        1, **pendulum(0, backlash=0.0, initial_angle=-0.05, damping=2.0), **clutch(0.0, 200.0), shaft__load=10.0,
+        excitation__amplitude_x=1e-4, excitation__amplitude_y=0.0,
+    )  # fmt: skip
+    for motion in (settled(pressed), examined(pressed, periods(600, 590, 600))):
+        duty = duty_of(motion, 3.0)
+        (bears,), largest = duty.rows, max(duty.cycles, key=lambda cycle: cycle.range)
+        assert (bears.engagements_per_hour, bears.impact_speed_max, bears.torque_jump_max) == (0.0, 0.0, 0.0)
+        assert math.isnan(bears.torque_equivalent)
+        assert bears.torque_max == pytest.approx(200.0 * bears.windup_max, rel=1e-9)
+        assert largest.range == pytest.approx(200.0 * (bears.windup_max - bears.windup_min), rel=1e-6)
+        assert 0.0 < bears.windup_min < bears.windup_max
+
+
+def test_a_run_that_begins_wound_up_counts_from_there() -> None:
+    begun = drive(1, **pendulum(0, initial_windup=0.01, initial_clutch=2.0))
+    run = periods(12, 0, 12)
+    (bears,), row = duty_of(examined(begun, run), 3.0).rows, one(begun, run)
+    assert bears.windup_max == pytest.approx(row["pendulums.0.windup.max"], rel=1e-9)
+    assert bears.windup_max >= 0.01
+    assert bears.torque_jump_max == 0.0
