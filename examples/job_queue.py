@@ -1,6 +1,6 @@
 """Workers of Sprag as jobs of Slurm, PBS or SGE: a Dask scheduler here, and jobs that are replaced when they end.
 
-    pip install 'sprag-study[cluster]' dask-jobqueue
+    pip install "${SPRAG}[cluster]" dask-jobqueue
     python job_queue.py slurm --host head.example --jobs 8 --cores 32 --memory "64 GiB" --time 08:00:00
     SPRAG_EXECUTOR=dask://head.example:8786 sprag serve
 

@@ -188,10 +188,24 @@ def test_no_text_has_foreign_distributions_installed() -> None:
                 continue
             requirement = Requirement(word.replace("NN", "1"))
             assert requirement.name in known, f"{name}: {word}"
+            of_program = name.startswith(("service/", "worker/", "sprag_study/"))  # installed where it says so
+            assert old or of_program or requirement.name != project["name"], f"{name}: {word} is on no index"
             assert requirement.name != project["name"] or requirement.extras <= set(extras), f"{name}: {word}"
         if not old:
             assert not re.search(r"\b(?:import|from) sprag\b|python3? -m sprag\b|sprag\[[a-z]", text), name
     assert seen > 10
+
+
+def test_every_page_installs_the_wheel_that_the_first_page_names() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    wheel = f"SPRAG=dist/sprag_study-{project['version']}-py3-none-any.whl\n"
+    assert wheel in (ROOT / "README.md").read_text("utf-8")
+    extras = []
+    for name, text in texts():
+        extras += re.findall(r"pip install [^`\n]*\$\{SPRAG\}\[([\w,]+)\]", text)
+        assert name.startswith("CHANGELOG") or not re.search(r"pip install [^`\n]*sprag_study-", text), name
+    assert {one for extra in extras for one in extra.split(",")} <= set(project["optional-dependencies"])
+    assert len(extras) > 8
 
 
 def test_a_foreign_distribution_is_noticed() -> None:
