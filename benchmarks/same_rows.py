@@ -44,10 +44,10 @@ def rows_of(folder: Path, spec: Mapping[str, Any], cut: Cut) -> list[dict[str, A
     processes, chunk, more = cut
     file = folder / "spec.json"
     file.write_text(json.dumps(spec), encoding="utf-8")
-    options = ("--processes", processes, "--chunk", chunk, *more)
+    options = ("--processes", processes, *more)
     done = subprocess.run(
         [*COMMAND, "run", str(file), "--json", *map(str, options)],
-        capture_output=True, env=environment(), check=False,
+        capture_output=True, env=environment(SPRAG_CHUNK_CASES=str(chunk)), check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr.decode()
     rows: list[dict[str, Any]] = json.loads(done.stdout)["rows"]

@@ -7,9 +7,9 @@ from contextlib import ExitStack
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag_study.here import Here
 from sprag_study.service.client.queries import spec_of
 from sprag_study.service.client.synchronous.study import Study
+from sprag_study.service.here import Here
 from sprag_study.service.jobs.local import opened, pool_size, run_folder, run_stored
 from sprag_study.service.plain_data import plain
 from sprag_study.service.settings import Settings

@@ -6,12 +6,14 @@ import gc
 import json
 import logging
 import os
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
+from _pytest.capture import CaptureIO
 from hypothesis import HealthCheck, settings
 
 from tests import postgres
@@ -157,6 +159,14 @@ def sprag(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -
         return Finished(code, captured.out, captured.err)
 
     return run
+
+
+@pytest.fixture
+def terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands write to a wide terminal without colours."""
+    monkeypatch.setattr(CaptureIO, "isatty", lambda stream: stream is sys.stdout)
+    for name, value in {"TERM": "dumb", "COLUMNS": "2000", "LINES": "100"}.items():
+        monkeypatch.setenv(name, value)
 
 
 @pytest.fixture(scope="session")

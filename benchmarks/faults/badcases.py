@@ -36,10 +36,10 @@ def badcases(
     """Run a study with bad cases, and without them when it is ``timed``; gives the figures."""
     draw = random.Random(seed)
     made = harness.spec(cases, periods)
-    options = ["--processes", processes, *(["--chunk", chunk] if chunk else [])]
+    options = ["--processes", processes]
     drawn = draw.sample(range(cases), crashing + hanging)
     odd = {case: "crashed" if place < crashing else "timed_out" for place, case in enumerate(drawn)}
-    limit = {"SPRAG_CHUNK_TIMEOUT": f"{timeout:g}"}
+    limit = {"SPRAG_CHUNK_TIMEOUT": f"{timeout:g}", **({"SPRAG_CHUNK_CASES": str(chunk)} if chunk else {})}
     plain = 0.0
     if timed:
         place = folder / "plain"  # where the other one finds no rows to reuse

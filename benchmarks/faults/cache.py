@@ -26,7 +26,7 @@ def cache(folder: Path, *, cases: int, size: int = 64) -> dict[str, Any]:
     for file in damaged:
         os.truncate(file, size)
     with harness.running(
-        folder, "--processes", 2, "--chunk", max(1, cases // 16), SPRAG_KERNEL_CACHE=str(folder / "cache")
+        folder, "--processes", 2, SPRAG_CHUNK_CASES=str(max(1, cases // 16)), SPRAG_KERNEL_CACHE=str(folder / "cache")
     ) as service:
         study = service.submit(made)
         service.finish(study)

@@ -103,8 +103,8 @@ def cluster(
         dask.start_scheduler()
         for _ in range(workers):
             dask.start_worker()
-        options = ("--processes", workers, "--chunk", chunk)
-        with harness.running(folder, *options, SPRAG_EXECUTOR=dask.url, **cache) as service:
+        settings = {"SPRAG_CHUNK_CASES": str(chunk), "SPRAG_EXECUTOR": dask.url, **cache}
+        with harness.running(folder, "--processes", workers, **settings) as service:
             study = service.submit(made)
             begin = time.monotonic()
             for share in sorted(draw.uniform(0.02, 0.95) for _ in range(count)):

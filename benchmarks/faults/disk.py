@@ -24,7 +24,7 @@ def file_limit(folder: Path, *, cases: int, studies: int, periods: float = 20.0)
     Store.open(f"sqlite:///{empty}").close()
     # Half of them: enough for each alone, and so little that they are held long before the last one ends.
     room = int(0.5 * studies * estimated_bytes(harness.study_of(specs[0]))) + RESERVE_BYTES + empty.stat().st_size
-    service = harness.Service(folder, "--processes", 1, "--chunk", 250)
+    service = harness.Service(folder, "--processes", 1, SPRAG_CHUNK_CASES="250")
     service.before_exec = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (room, resource.RLIM_INFINITY))
     service.start()
     try:
@@ -81,7 +81,7 @@ def _on_small_disk(place: Path, cases: int) -> dict[str, Any]:
     ballast = place / "ballast"
     waits: list[float] = []
     reasons: list[str] = []
-    with harness.running(place, "--processes", 2, "--chunk", 100) as service:
+    with harness.running(place, "--processes", 2, SPRAG_CHUNK_CASES="100") as service:
         study = service.submit(made)
         for share in (0.1, 0.3, 0.5):
             harness.until(lambda share=share: harness.done(service.database, study) > share * cases, "it goes on")

@@ -50,7 +50,7 @@ def kills(
     if drives:
         made |= {"tolerances": _TOLERANCES, "drives": drives, "seed": seed}
     cases = harness.study_of(made).cases
-    service = harness.Service(folder, "--processes", processes, "--chunk", chunk)
+    service = harness.Service(folder, "--processes", processes, SPRAG_CHUNK_CASES=str(chunk))
     service.start()
     study = service.submit(made)
     _count_claims(service.database)

@@ -27,7 +27,7 @@ def served_rounds(folder: Path, *, count: int, seed: int, processes: int = 2, ch
     undisturbed = _undisturbed(f"sqlite:///{folder / 'undisturbed.sqlite3'}", chunk)
     cases = len(undisturbed[1])
     killed: Counter[str] = Counter()
-    with harness.running(folder, "--processes", processes, "--chunk", chunk) as service:
+    with harness.running(folder, "--processes", processes, SPRAG_CHUNK_CASES=str(chunk)) as service:
         study = service.submit(spec())
         for mark in sorted(draw.randrange(cases) for _ in range(count)):
             harness.until(lambda mark=mark: harness.done(service.database, study) >= mark, "the study goes on")

@@ -22,8 +22,8 @@ _LATEST = "SELECT max(epoch) FROM dispatchers"
 def _worker(database: Path, log: Path, *options: str) -> subprocess.Popen[bytes]:
     with log.open("wb") as errors:
         return subprocess.Popen(
-            [*harness.COMMAND, "worker", "--db", str(database), "--processes", "1", *options],
-            stderr=errors, env=harness.environment(),
+            [*harness.COMMAND, "admin", "worker", "--db", str(database), *options],
+            stderr=errors, env=harness.environment(SPRAG_PROCESSES="1"),
         )  # fmt: skip
 
 

@@ -30,7 +30,7 @@ def sweeps(folder: Path, *, count: int, seed: int, lines: int, processes: int = 
     study = harness.study_of(made)
     whole = models.run_chunk(study, 0, study.cases)
     killed: Counter[str] = Counter()
-    with harness.running(folder, "--processes", processes, "--chunk", 1) as service:
+    with harness.running(folder, "--processes", processes, SPRAG_CHUNK_CASES="1") as service:
         swept = service.submit(made)
         for mark in sorted(draw.randrange(study.cases) for _ in range(count)):
             harness.until(lambda mark=mark: harness.done(service.database, swept) >= mark, "the study goes on")

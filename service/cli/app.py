@@ -6,8 +6,8 @@ import json
 import os
 import sys
 import traceback
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from functools import cache
 from typing import Annotated, Any, Final, cast
 
@@ -31,7 +31,7 @@ from sprag_study.service.cli.console import (
 )
 from sprag_study.service.cli.groups import Groups, LazyCommands, Word, common_first
 from sprag_study.service.cli.language import OPTION, VARIABLE, chosen, code_of, refusal, translate
-from sprag_study.service.cli.old_words import forwarded
+from sprag_study.service.cli.old_words import forwarded, without_gone
 from sprag_study.service.extras import command_for
 from sprag_study.service.faults import FaultError, Kind
 from sprag_study.service.languages import N_, _
@@ -58,7 +58,7 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-def _known_language(code: str | None) -> None:
+def _known_language(code: str | None) -> str | None:
     if code is not None and code_of(code) not in languages.available():
         raise wrong_option(
             OPTION,
@@ -67,6 +67,7 @@ def _known_language(code: str | None) -> None:
             code,
             allowed=", ".join(languages.available()),
         )
+    return None if code is None else code_of(code)
 
 
 @app.callback()
@@ -74,7 +75,7 @@ def _every_command(
     _version: Annotated[
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
     ] = False,
-    _language: Annotated[
+    language: Annotated[
         str | None,
         typer.Option(
             OPTION,
@@ -82,7 +83,7 @@ def _every_command(
             metavar="CODE",
             callback=_known_language,
             show_envvar=False,
-            help="Language of help and messages, such as uk; default: that of the system.",
+            help="Language, such as uk; default: that of the system, for pictures English.",
         ),
     ] = None,
     server: Annotated[
@@ -98,7 +99,7 @@ def _every_command(
     ] = False,
 ) -> None:
     """Options of every command; typer shows the application's own help instead of this text."""
-    CURRENT.set(Common(server, token, as_json))
+    CURRENT.set(Common(server, token, as_json, language))
 
 
 _HERE, _SERVICE, _OPERATE = N_("Studies"), N_("A service"), N_("Administration")
@@ -159,8 +160,12 @@ def _executed(common: Sequence[str], typed: Sequence[str]) -> int:
     try:
         words, new = forwarded(typed)
         if new and not wants_json():
-            say(_("`sprag {old}` is called `sprag {new}` from now on", old=typed[0], new=new))
-        with act_as(of_machine(Door.COMMAND)):
+            old = " ".join(typed[:3] if typed[0] == "admin" else typed[:1])
+            say(_("`sprag {old}` is called `sprag {new}` from now on", old=old, new=new))
+        words, settings, gone = without_gone(words)
+        if not wants_json():
+            say(*(_("`{old}` is `{new}` from now on", old=old, new=instead) for old, instead in gone))
+        with act_as(of_machine(Door.COMMAND)), _environment(settings):
             code = _invoke([*common, *words])
         sys.stdout.flush()
     except (BrokenPipeError, _PipeClosedError):
@@ -171,6 +176,19 @@ def _executed(common: Sequence[str], typed: Sequence[str]) -> int:
         place = error.filename or _("standard output")
         code = _report(TroubleError("write-failed", f"{place}: {(error.strerror or str(error)).lower()}"))
     return int(code)
+
+
+@contextmanager
+def _environment(settings: Mapping[str, str]) -> Iterator[None]:
+    """Settings of the environment within the block."""
+    before = {name: os.environ.get(name) for name in settings}
+    os.environ.update(settings)
+    try:
+        yield
+    finally:
+        os.environ.update({name: value for name, value in before.items() if value is not None})
+        for name in (name for name, value in before.items() if value is None):
+            del os.environ[name]
 
 
 class _PipeClosedError(Exception):

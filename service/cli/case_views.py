@@ -20,10 +20,10 @@ from sprag_study.service.cli.described import option, parameter, query_of, signe
 from sprag_study.service.cli.file_formats import require_csv, value_format
 from sprag_study.service.cli.files import output, read_study, require_cases, to_file, write_pieces
 from sprag_study.service.cli.names import study_of
-from sprag_study.service.cli.options import SHARED, ValueFormat, in_decimals, in_language
+from sprag_study.service.cli.options import SHARED, in_decimals, in_language
 from sprag_study.service.cli.remote import connection
 from sprag_study.service.cli.sources import SpecOrStudy, is_study, refuse_local
-from sprag_study.service.faults import Fault, FaultError, choice_of
+from sprag_study.service.faults import Fault, FaultError
 from sprag_study.service.formats import PICTURES
 from sprag_study.service.languages import N_, _
 from sprag_study.service.views.case_questions import CASE_VIEWS, TRANSIENT
@@ -46,13 +46,12 @@ def command(about: ViewInfo) -> Callable[..., None]:
     counted = any(one.option == "--points" for one in asked)  # which then are no file of cases
 
     def run(
-        spec: str, case: int, file: str | None, form: ValueFormat | None, points_file: str | None = None,
-        tables: list[str] | None = None, start: int | None = None, every: bool = False, language: str | None = None,
-        decimal: Decimal | None = None, **settings: Any,
+        spec: str, case: int, file: str | None, points_file: str | None = None, tables: list[str] | None = None,
+        start: int | None = None, every: bool = False, decimal: Decimal | None = None, **settings: Any,
     ) -> None:  # fmt: skip
-        written = value_format(form, file, PICTURES if about.pictures else ())
+        written = value_format(file, PICTURES if about.pictures else ())
         require_csv(None, decimal, written)
-        drawing = [*in_language(language), *in_decimals(decimal)]
+        drawing = [*(in_language() if written in PICTURES else ()), *in_decimals(decimal)]
         if is_study(spec):
             from sprag_study.service.client.wire import case_path
 
@@ -75,7 +74,6 @@ def command(about: ViewInfo) -> Callable[..., None]:
             )
         with naming_options(study, asked, view.lacks):
             _check_start(study, start)
-            require_language(dict(drawing))
             chosen = view.choose(study, case, about.question(**settings))
         if every:
             _write_all(study, chosen[0], file, decimal, lines=written == "json")
@@ -84,7 +82,7 @@ def command(about: ViewInfo) -> Callable[..., None]:
 
     options = [parameter(one.name, option(one), one.default) for one in asked]
     shared = {"case": 0, **({"start": None} if about.starts else {}), **({} if counted else {"points_file": None})}
-    shared |= dict.fromkeys(("tables", "file", "form", "decimal", *(["language"] if about.pictures else [])))
+    shared |= dict.fromkeys(("tables", "file", "decimal"))
     last = [parameter(name, SHARED[name], default) for name, default in shared.items()]
     last += [parameter("every", _EachCase, False)] if about is TRANSIENT else []
     return signed(run, about.summary, [parameter("spec", SpecOrStudy, ...), *options, *last])
@@ -98,11 +96,6 @@ def say_file(file: str, form: str | None, first: int | None = None) -> None:
         say(_("table: {file}", file=file))
     else:
         say(_("table: {file}, the first {count} cases of the selection", file=file, count=f"{first:,}"))
-
-
-def require_language(drawing: Mapping[str, str]) -> None:
-    """Refuse a language of a picture that there is not; FaultError."""
-    choice_of("language", drawing.get("language", languages.ENGLISH), languages.available())
 
 
 def _check_start(study: Study, start: int | None) -> None:

@@ -1,4 +1,4 @@
-"""``sprag show ID cases``: the finished cases of a study of a running service, chosen and sorted."""
+"""``sprag show SPEC|ID cases`` and ``case``: the finished cases of a study, chosen and sorted, and one of them."""
 
 from __future__ import annotations
 
@@ -10,12 +10,22 @@ import typer
 from sprag_study.service.cli import completion
 from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.compare import pair
-from sprag_study.service.cli.console import WrongInputError, say, show_table, write_json
+from sprag_study.service.cli.console import (
+    WrongInputError,
+    heading,
+    in_unit,
+    piped,
+    say,
+    show_table,
+    table_words,
+    unit_of,
+    write_json,
+)
 from sprag_study.service.cli.described import option, parameter, query_of, signed
-from sprag_study.service.cli.names import study_of
-from sprag_study.service.cli.options import CaseOption, StudyId
-from sprag_study.service.cli.remote import connection
-from sprag_study.service.cli.shown import heading
+from sprag_study.service.cli.file_formats import require_table
+from sprag_study.service.cli.options import OF_SPEC, SHARED, CaseOption, FileUnits, KeptIn, PointsFile, TableFiles
+from sprag_study.service.cli.remote import opened, read_in
+from sprag_study.service.cli.sources import SpecOrStudy
 from sprag_study.service.faults import Fault
 from sprag_study.service.languages import N_, _
 from sprag_study.service.views.setting import settings_of
@@ -38,48 +48,70 @@ _Results = Annotated[
 _Limit = Annotated[int, typer.Option(min=1, max=100_000, help="Most cases to show.")]
 
 
-def _cases(study_id: str, result: list[str] | None, limit: int, **asked: Any) -> None:
-    from sprag_study.service.client.wire import study_path
+def _cases(
+    study: str, result: list[str] | None, limit: int, units: str | None, points_file: str | None,
+    tables: list[str] | None, db: str | None, **asked: Any,
+) -> None:  # fmt: skip
+    from sprag_study.service.client.wire import case_path, study_path
 
     for text in asked["at"] or ():
         pair(text)
-    with connection() as client:
+    require_table(units)
+    with opened(study, points=points_file, tables=tables, db=db) as (source, study_id):
         query = [*query_of(_ASKED, asked), ("page_size", str(min(limit, _PAGE)))]
-        found, units = _first(client.pages(f"{study_path(study_of(client, study_id))}/cases", query), limit)
-    if wants_json():
-        write_json({"cases": found})
-    elif found:
-        _show(found, result or (), units)
-    else:
-        show_table("", ((_("case"), True), (_("ending"), False)), ())
+        found, si = _first(source.pages(f"{study_path(study_id)}/cases", query), limit)
+        if wants_json():
+            write_json({"cases": found})
+            return
+        names = found[0] if found else source.request("GET", case_path(study_id, 0, ""))
+        with read_in(source, study_id, units), table_words():
+            _show(found, names, result or (), si)
 
 
 cases: Final = signed(
     _cases,
     "List finished cases of a study, in order of their numbers or sorted over all of them.",
     [
-        parameter("study_id", StudyId, ...), *(parameter(one.name, option(one), one.default) for one in _ASKED),
+        parameter("study", SpecOrStudy, ...), *(parameter(one.name, option(one), one.default) for one in _ASKED),
         parameter("result", _Results, None), parameter("limit", _Limit, 50),
+        *(parameter(name, SHARED[name], None) for name in ("units", *OF_SPEC)),
     ],
 )  # fmt: skip
 
 
-def case(study_id: StudyId, case: CaseOption = 0) -> None:
+def case(
+    study: SpecOrStudy,
+    case: CaseOption = 0,
+    units: FileUnits = None,
+    points_file: PointsFile = None,
+    tables: TableFiles = None,
+    db: KeptIn = None,
+) -> None:
     """Show one case: how it ended, its parameters and its results."""
     from sprag_study.service.client.wire import case_path
 
-    with connection() as client:
-        shown = client.request("GET", case_path(study_of(client, study_id), case, ""))
-    if wants_json():
-        write_json(shown)
-        return
-    meaning = f"{shown['ending']}. {_(shown['ending_meaning'])}"
-    say(_("case {case}: {text}", case=shown["case"], text=meaning))
-    say(*(f"{flag}: {_(meaning)}" for flag, meaning in shown["flag_meanings"].items()))
-    units = {name: "" if unit == "1" else unit for name, unit in shown["units"].items()}
-    for title, values in ((_("parameters"), shown["parameters"]), (_("results"), shown["results"])):
-        rows = [(name, value, units.get(name, "")) for name, value in values.items()]
-        show_table(title, ((_("name"), False), (_("value"), True), (_("unit"), False, True)), rows)
+    require_table(units)
+    with opened(study, points=points_file, tables=tables, db=db) as (source, study_id):
+        shown = source.request("GET", case_path(study_id, case, ""))
+        if wants_json():
+            write_json(shown)
+            return
+        meaning = f"{shown['ending']}. {_(shown['ending_meaning'])}"
+        say(_("case {case}: {text}", case=shown["case"], text=meaning))
+        say(*(f"{flag}: {_(meaning)}" for flag, meaning in shown["flag_meanings"].items()))
+        with read_in(source, study_id, units), table_words():
+            _show_case(shown)
+
+
+def _show_case(shown: Mapping[str, Any]) -> None:
+    """Parameters and results in two tables; for programs in one."""
+    parts = {_("parameters"): shown["parameters"], _("results"): shown["results"]}
+    if piped():
+        parts = {"": {**shown["parameters"], **shown["results"]}}
+    columns = ((_("name"), False), (_("value"), True), (_("unit"), False, True))
+    for title, values in parts.items():
+        known = ((name, value, shown["units"].get(name, "1")) for name, value in values.items())
+        show_table(title, columns, [(name, in_unit(value, si), unit_of(si)) for name, value, si in known])
 
 
 def _first(pages: Iterable[dict[str, Any]], limit: int) -> tuple[list[dict[str, Any]], dict[str, str]]:
@@ -93,9 +125,10 @@ def _first(pages: Iterable[dict[str, Any]], limit: int) -> tuple[list[dict[str, 
     return shown[:limit], units
 
 
-def _show(shown: Sequence[dict[str, Any]], results: Sequence[str], units: Mapping[str, str]) -> None:
-    """A row for each case: its parameters, how it ended, its regime and flags, and the chosen results."""
-    first = shown[0]
+def _show(
+    shown: Sequence[dict[str, Any]], first: Mapping[str, Any], results: Sequence[str], units: Mapping[str, str]
+) -> None:
+    """A row for each case: its parameters, how it ended, its regime and flags, and the chosen results; as ``first``."""
     unknown = [name for name in results if name not in first["results"]]
     if unknown:
         allowed = ", ".join(first["results"])

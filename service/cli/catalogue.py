@@ -8,7 +8,7 @@ import typer
 
 from sprag_study.service.cli import completion
 from sprag_study.service.cli.common import wants_json
-from sprag_study.service.cli.console import show_table, write_json
+from sprag_study.service.cli.console import show_table, table_words, write_json
 from sprag_study.service.cli.remote import connection
 from sprag_study.service.languages import _
 
@@ -31,12 +31,14 @@ def models(
     if wants_json():
         write_json(found)
     elif name is None:
-        columns = ((_("model"), False, True), (_("parameters"), True), (_("results"), True), (_("engine"), False))
-        rows = [(m["name"], len(m["parameters"]), len(m["results"]), m["engine_version"]) for m in found["models"]]
-        show_table("", columns, rows)
+        with table_words():
+            columns = ((_("model"), False, True), (_("parameters"), True), (_("results"), True), (_("engine"), False))
+            rows = [(m["name"], len(m["parameters"]), len(m["results"]), m["engine_version"]) for m in found["models"]]
+            show_table("", columns, rows)
     else:
-        parameters = [(p["path"], p["unit"], p["range"], _(p["help"])) for p in found["parameters"]]
-        columns = ((_("path"), False, True), (_("unit"), False), (_("range"), False), ("", False))
-        show_table(_("parameters"), columns, parameters)
-        results = [(r["name"], r["unit"], _(r["description"])) for r in found["results"]]
-        show_table(_("results"), ((_("name"), False, True), (_("unit"), False), ("", False)), results)
+        with table_words():
+            parameters = [(p["path"], p["unit"], p["range"], _(p["help"])) for p in found["parameters"]]
+            columns = ((_("path"), False, True), (_("unit"), False), (_("range"), False), ("", False))
+            show_table(_("parameters"), columns, parameters)
+            results = [(r["name"], r["unit"], _(r["description"])) for r in found["results"]]
+            show_table(_("results"), ((_("name"), False, True), (_("unit"), False), ("", False)), results)

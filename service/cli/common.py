@@ -22,6 +22,7 @@ class Common:
     server: str | None = None
     token: str | None = None
     json: bool = False
+    language: str | None = None
 
 
 CURRENT: ContextVar[Common] = ContextVar("common", default=Common())  # noqa: B039 - it cannot be changed

@@ -1,8 +1,9 @@
-"""``sprag compare``: studies of a running service side by side."""
+"""``sprag compare``: studies side by side."""
 
 from __future__ import annotations
 
 import json
+from contextlib import ExitStack
 from typing import Annotated
 
 import typer
@@ -10,11 +11,20 @@ import typer
 from sprag_study.service.answers.differing import MOST_COMPARED
 from sprag_study.service.cli import completion
 from sprag_study.service.cli.common import wants_json
-from sprag_study.service.cli.console import Column, say, show_table, write_json, wrong_option
-from sprag_study.service.cli.names import study_of
-from sprag_study.service.cli.options import CurveBy
-from sprag_study.service.cli.remote import connection
-from sprag_study.service.cli.shown import show_curves
+from sprag_study.service.cli.console import (
+    Column,
+    piped,
+    say,
+    show_table,
+    table_words,
+    write_json,
+    write_text,
+    wrong_option,
+)
+from sprag_study.service.cli.options import CurveBy, KeptIn
+from sprag_study.service.cli.remote import opened
+from sprag_study.service.cli.shown import show_curves, write_curves
+from sprag_study.service.cli.sources import is_study, refuse_local
 from sprag_study.service.languages import N_, _
 
 
@@ -22,7 +32,7 @@ def compare(
     studies: Annotated[
         list[str],
         typer.Argument(
-            metavar="ID...", help="Studies, named as for other commands.", autocompletion=completion.studies
+            metavar="SPEC|ID...", help="Studies, named as for other commands.", autocompletion=completion.studies
         ),
     ],
     x: Annotated[
@@ -47,8 +57,9 @@ def compare(
     at: Annotated[
         list[str] | None, typer.Option("--at", metavar="PATH=VALUE", help="Value at which another axis is held.")
     ] = None,
+    db: KeptIn = None,
 ) -> None:
-    """Compare studies: the inputs in which they differ, and the same curves of each."""
+    """Compare studies: the inputs in which they differ, and the same curves of each. Specs are run here first."""
     from sprag_study.service.client import Study
     from sprag_study.service.client import compare as side_by_side
 
@@ -56,24 +67,32 @@ def compare(
         raise wrong_option(
             "ID", "out-of-range", N_("wrong number of studies"), len(studies), allowed=f"2 .. {MOST_COMPARED}"
         )
+    if all(map(is_study, studies)):
+        refuse_local(db=db)
     held = dict(pair(text) for text in at or ())
-    with connection() as client:
-        named = [Study(client, study_of(client, text)) for text in studies]
+    with ExitStack() as stack:
+        sources = [stack.enter_context(opened(text, db=None if is_study(text) else db)) for text in studies]
+        named = [Study(source, study_id) for source, study_id in sources]
         found = side_by_side(named, x, y or (), by=by or (), at=held)
+    curves = [(name, drawn.data) for name, drawn in zip(found.names, found.curves, strict=False)]
     if wants_json():
-        curves = {name: curves.data for name, curves in zip(found.names, found.curves, strict=False)}
-        write_json({"studies": list(found.names), "inputs": found.inputs, "curves": curves})
+        write_json({"studies": list(found.names), "inputs": found.inputs, "curves": dict(curves)})
         return
-    columns: list[Column] = [(_("input"), False, True), *((name, False) for name in found.names)]
     rows = [(pointer, *map(_text, values)) for pointer, values in found.inputs.items()]
-    if rows:
-        show_table(_("inputs that differ"), columns, rows)
-    else:
+    with table_words():
+        columns: list[Column] = [(_("input"), False, True), *((name, False) for name in found.names)]
+        if rows or piped():
+            show_table(_("inputs that differ"), columns, rows)
+        if piped() and curves:
+            write_text("\n")
+            write_curves(curves)
+    if not rows:
         say(_("No inputs differ."))
-    if not found.curves:
+    if not curves:
         say(_("These studies have no varying parameter in common, so there are no curves to compare."))
-    for name, drawn in zip(found.names, found.curves, strict=False):
-        show_curves(drawn.data, name)
+    if not piped():
+        for name, drawn in curves:
+            show_curves(drawn, name)
 
 
 def pair(text: str) -> tuple[str, str]:

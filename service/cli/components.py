@@ -7,7 +7,7 @@ from typing import Annotated, Any, cast
 import typer
 
 from sprag_study.service.cli.common import wants_json
-from sprag_study.service.cli.console import say, show_table, write_json
+from sprag_study.service.cli.console import say, show_table, table_words, write_json
 from sprag_study.service.cli.files import decode, read_bytes, read_spec, write_pieces
 from sprag_study.service.cli.groups import Groups
 from sprag_study.service.cli.options import OutputFile
@@ -36,12 +36,14 @@ def list_components(
     if wants_json():
         write_json(found)
         return
-    columns = ((_("id"), False, True), (_("kind"), False), (_("name"), False), (_("fields"), False), (_("note"), False))
-    rows = []
-    for one in found["components"]:
-        fields = ", ".join(f"{name} {text}" for name, text in _read(one).items())
-        rows.append((one["id"], one["kind"], one["name"], fields, one["note"]))
-    show_table("", columns, rows)
+    with table_words():
+        heads = (_("id"), _("kind"), _("name"), _("fields"), _("note"))
+        columns = [(head, False, place == 0) for place, head in enumerate(heads)]
+        rows = []
+        for one in found["components"]:
+            fields = ", ".join(f"{name} {text}" for name, text in _read(one).items())
+            rows.append((one["id"], one["kind"], one["name"], fields, one["note"]))
+        show_table("", columns, rows)
 
 
 def _read(component: dict[str, Any]) -> dict[str, str]:

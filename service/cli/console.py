@@ -6,12 +6,15 @@ standard error, so that programs never have to parse prose.
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import math
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from enum import IntEnum
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, Final
@@ -28,6 +31,10 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from sprag_study.service.reading.quantities import Units
+
+#: Units in which tables have quantities; SI where none are asked for.
+_UNITS: ContextVar[Units | None] = ContextVar("units", default=None)
 #: Width of titles that do not go to a terminal; tables are as wide as they need.
 _PLAIN_WIDTH = 160
 #: Fraction of the seconds of a time (RFC 3339).
@@ -234,6 +241,58 @@ def console() -> Console:
     return Console(width=None if sys.stdout.isatty() else _PLAIN_WIDTH, soft_wrap=False, highlight=False)
 
 
+def piped() -> bool:
+    """Whether standard output is for a program rather than for people at a terminal."""
+    return not sys.stdout.isatty()
+
+
+@contextmanager
+def table_words() -> Iterator[None]:
+    """Words and numbers of tables within the block: those of the reader on a terminal, else English ones."""
+    with languages.language(languages.ENGLISH if piped() else languages.current()):
+        yield
+
+
+@contextmanager
+def tables_in(units: Units) -> Iterator[None]:
+    """Quantities of tables within the block have these units."""
+    before = _UNITS.set(units)
+    try:
+        yield
+    finally:
+        _UNITS.reset(before)
+
+
+def in_unit(value: Any, si: str) -> Any:
+    """A number in SI in the unit of tables; texts and missing numbers as they are."""
+    units = _UNITS.get()
+    return value if units is None else units.cell(value, si)
+
+
+def unit_of(si: str) -> str:
+    """The unit of tables for quantities of an SI unit; "" for numbers without one."""
+    units = _UNITS.get()
+    unit = si if units is None else units.unit(si)
+    return "" if unit == "1" else unit
+
+
+class Heading(str):
+    """The heading of a column of quantities, whose numbers are in the unit ``si``."""
+
+    __slots__ = ("si",)
+    si: str
+
+    def __new__(cls, text: str, si: str) -> Heading:
+        made = super().__new__(cls, text)
+        made.si = si
+        return made
+
+
+def heading(name: str, si: str) -> Heading:
+    """The heading of a column of quantities: the name with the unit of tables."""
+    return Heading(f"{name} [{unit}]" if (unit := unit_of(si)) else name, si)
+
+
 #: A heading, whether the column holds numbers, and (False where it is left out) whether its texts are never cut.
 Column = tuple[str, bool] | tuple[str, bool, bool]
 
@@ -243,18 +302,15 @@ def show_table(title: str, columns: Iterable[Column], rows: Iterable[Sequence[ob
 
     On a terminal it is as wide as that: headings and texts are broken into lines, and columns for which there is no
     room go on below, each time beside the first one. Numbers and ids are never cut, and names with dots only after
-    these. Elsewhere it is for programs: the title alone in its line, then headings and rows with tabs between cells.
+    these. Elsewhere it is for programs (`write_rows`), without its title.
     """
     headed = list(columns)
-    texts = [[cell_text(cell) for cell in row] for row in rows]
-    if not sys.stdout.isatty():
-        lines = [[heading.replace(".\n", ".") for heading, *_ in headed], *texts]
-        write_text(
-            "".join(
-                f"{line}\n" for line in ([title] if title else []) + ["\t".join(map(_flat, line)) for line in lines]
-            )
-        )
+    units = [head.si if isinstance(head, Heading) else "1" for head, *_ in headed]
+    cells = [list(map(in_unit, row, units)) for row in rows]
+    if piped():
+        write_rows([head.replace(".\n", ".") for head, *_ in headed], cells)
         return
+    texts = [[cell_text(cell) for cell in row] for row in cells]
     from rich.cells import cell_len
 
     out = console()
@@ -269,9 +325,22 @@ def show_table(title: str, columns: Iterable[Column], rows: Iterable[Sequence[ob
         out.print(_table(title if number == 0 else "", headed, part, texts))
 
 
-def _flat(cell: str) -> str:
+def write_rows(headings: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
+    """Write a table for programs: lines with tabs between cells, whole numbers with decimal points, English words."""
+    lines = ("\t".join(map(_flat, row)) for row in ([*headings], *rows))
+    write_text("".join(f"{line}\n" for line in lines))
+
+
+def write_table(content: bytes) -> None:
+    """Write a table of CSV for programs, as `write_rows`."""
+    headings, *rows = csv.reader(io.StringIO(content.decode("utf-8"), newline=""))
+    write_rows(headings, rows)
+
+
+def _flat(cell: object) -> str:
     """A cell without what separates cells and lines."""
-    return " ".join(re.split(r"[\t\r\n]+", cell))
+    text = str(cell) if isinstance(cell, float) and math.isfinite(cell) else cell_text(cell)
+    return " ".join(re.split(r"[\t\r\n]+", text))
 
 
 def _table(title: str, columns: Sequence[Column], widths: Mapping[int, int], texts: Iterable[Sequence[str]]) -> Table:

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sprag_study.service.cli.audit import Action, Actor, FormOption, Since, Target, Until, write_stored
 from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.configured import read_settings
 from sprag_study.service.cli.console import ExitCode, TroubleError, WrongInputError, say, write_json
 from sprag_study.service.cli.groups import Groups
-from sprag_study.service.cli.options import Database, OutputFile
+from sprag_study.service.cli.options import Database
 from sprag_study.service.cli.stores import database_of, named_store
 from sprag_study.service.languages import _
 
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
 
 
 app = typer.Typer(
-    help="Upgrade, check, back up, move and adopt the database; read its audit log.",
+    help="Upgrade, check, back up, move and adopt the database.",
     no_args_is_help=True,
     cls=Groups,
 )
@@ -159,21 +158,6 @@ def move(
         print(_("{target} has every row of {source}; use it with --db from now on", **places))
         say(_("its schedules and reports are off until `sprag admin db adopt`; no longer start {source}", **places))
     _tell_damaged(moved.problems)
-
-
-@app.command()
-def audit(
-    since: Since = None,
-    until: Until = None,
-    actor: Actor = None,
-    action: Action = None,
-    target: Target = None,
-    form: FormOption = None,
-    output: OutputFile = None,
-    db: Database = None,
-) -> None:
-    """Write the audit log of the database, as `sprag admin audit` does."""
-    write_stored((since, until, actor, action, target), form, output, db)
 
 
 def _tell_damaged(problems: Sequence[str]) -> None:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sprag_study.service.cli.common import wants_json
-from sprag_study.service.cli.console import ExitCode, TroubleError, say, show_table, write_json
+from sprag_study.service.cli.console import ExitCode, TroubleError, say, show_table, table_words, write_json
 from sprag_study.service.cli.files import file_failure, write_pieces
 from sprag_study.service.cli.following import follow
 from sprag_study.service.cli.remote import served_by
@@ -127,6 +127,7 @@ def _show(client: Client, picture: Path) -> dict[str, Any]:
     return study
 
 
+@table_words()
 def _show_curve(curves: dict[str, Any]) -> None:
     """The mechanical characteristic as a table, the mean speed also as a bar."""
     from sprag_study.worker.models import OK

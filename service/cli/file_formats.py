@@ -11,7 +11,6 @@ import typer
 from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import WrongInputError, wrong_option
 from sprag_study.service.cli.files import to_file
-from sprag_study.service.cli.options import ValueFormat
 from sprag_study.service.formats import REPORT_FORMATS, SUFFIXES, Decimal, Format, Header, ReportFormat, format_of
 from sprag_study.service.languages import N_, _
 
@@ -44,11 +43,11 @@ def table_format(form: TableFormat | None, file: str | None) -> TableFormat:
     return found
 
 
-def value_format(form: ValueFormat | None, file: str | None, pictures: Sequence[str] = ()) -> str:
-    """The format of a view of one case; WrongInputError where only the file's name tells it, by an unknown ending."""
-    if form is None and file is not None and _has_ending(file):
-        return file_format(file, (*ValueFormat, *pictures))
-    return "json" if (wants_json() if form is None else form is ValueFormat.JSON) else "csv"
+def value_format(file: str | None, pictures: Sequence[str] = ()) -> str:
+    """The format of a view of one case: by the ending of a file; WrongInputError for an unknown one."""
+    if file is not None and _has_ending(file):
+        return file_format(file, ("csv", "json", *pictures))
+    return "json" if wants_json() else "csv"
 
 
 def require_csv(header: Header | None, decimal: Decimal | None, form: str | None) -> None:
@@ -56,6 +55,12 @@ def require_csv(header: Header | None, decimal: Decimal | None, form: str | None
     for option, value in (("--header", header), ("--decimal", decimal)):
         if value is not None and form != "csv":
             raise wrong_option(option, "not-used", N_("only CSV files have it"), value, allowed="csv")
+
+
+def require_table(units: str | None, form: str | None = None) -> None:
+    """Raise WrongInputError for ``--units`` where the answer is JSON and no file is written."""
+    if units is not None and form is None and wants_json():
+        raise wrong_option("--units", "not-used", N_("JSON is in SI units"), units, allowed=_("a table or a file"))
 
 
 def require_report(appendix: Sequence[str] | None, form: str) -> None:

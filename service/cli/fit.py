@@ -15,6 +15,7 @@ from sprag_study.service.cli.console import (
     cell_text,
     say,
     show_table,
+    table_words,
     warning_lines,
     write_json,
     write_text,
@@ -169,13 +170,14 @@ def law_text(coefficients: Sequence[float]) -> str:
 
 
 def _report(measured: MeasuredData, made: ClutchFitReport) -> None:
-    fields = ("degree", "rms", "max_residual", "rank")
-    degrees = [(*(dict(tried)[field] for field in fields), _condition(tried)) for tried in made["degrees_tried"]]
-    show_table(_("Degrees tried"), [(_(head), numeric) for head, numeric in _DEGREE_COLUMNS], degrees)
-    rows = zip(measured.lines, measured.rows.tolist(), made["residuals"], strict=True)
-    columns = [(_(head), numeric) for head, numeric in _ROW_COLUMNS]
-    cells = [(line, angle, torque, residual) for line, (angle, torque), residual in rows]
-    show_table(_("Residuals"), columns, cells)
+    with table_words():
+        fields = ("degree", "rms", "max_residual", "rank")
+        degrees = [(*(dict(tried)[field] for field in fields), _condition(tried)) for tried in made["degrees_tried"]]
+        show_table(_("Degrees tried"), [(_(head), numeric) for head, numeric in _DEGREE_COLUMNS], degrees)
+        rows = zip(measured.lines, measured.rows.tolist(), made["residuals"], strict=True)
+        columns = [(_(head), numeric) for head, numeric in _ROW_COLUMNS]
+        cells = [(line, angle, torque, residual) for line, (angle, torque), residual in rows]
+        show_table(_("Residuals"), columns, cells)
     law = law_text(made["coefficients"])
     spec = f'"clutch": {{"coefficients": {made["coefficients"]!r}, "windup_limit": {made["windup_limit"]!r}}}'
     numbers = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib import import_module
 from typing import Any, Final, NamedTuple
@@ -15,10 +16,10 @@ from sprag_study.service.languages import _
 
 #: Longest first sentence of a help text.
 _SENTENCE: Final = 400
+#: What ends the first part of a help text.
+_PART: Final = re.compile(r"[;:.](?: |$)")
 #: Options of every command, which may stand anywhere in the line, and how many values each has.
-_ANYWHERE: Final = {"--json": 0, "--server": 1, "--token": 1}
-#: Options before the command that have a value.
-_BEFORE: Final = ("--language",)
+_ANYWHERE: Final = {"--json": 0, "--server": 1, "--token": 1, "--language": 1}
 
 
 class Word(NamedTuple):
@@ -67,7 +68,17 @@ def command_of(name: str, source: Callable[..., None] | typer.Typer) -> Any:
             CommandInfo(name, callback=source), pretty_exceptions_short=False, rich_markup_mode=None
         )
     _with_numbers(command)
+    _pointing(command)
     return command
+
+
+def _pointing(command: Any) -> None:
+    """Let the help of a command say where the options of all commands are explained."""
+    options = ", ".join(_ANYWHERE)
+    everywhere = _("`sprag -h` explains {options}, which every command has.", options=options)
+    command.epilog = "\n\n".join(filter(None, (command.epilog, everywhere)))
+    for inner in getattr(command, "commands", {}).values():
+        _pointing(inner)
 
 
 def _with_numbers(command: Any) -> None:
@@ -80,19 +91,25 @@ def _with_numbers(command: Any) -> None:
 
 
 def _list_once(group: Any, name: str, options: Sequence[Any]) -> None:
-    """Hide options of commands that their group lists; the help of a command names them."""
+    """Hide options of commands that their group lists; the help of a command has a line for each."""
     listed = {(option.name, *option.opts) for option in options}
     for command in group.commands.values():
         hidden = [option for option in command.params if (option.name, *option.opts) in listed]
         for option in hidden:
             option.hidden = True
         if hidden and not command.epilog:
-            words = ", ".join(option.opts[-1] for option in hidden)
-            command.epilog = _(
-                "`sprag {group} --help` explains its further options: {options}", group=name, options=words
-            )
+            names = [" ".join([", ".join(option.opts), option.metavar or ""]).rstrip() for option in hidden]
+            width = max(map(len, names)) + 2
+            lines = [f"{text:{width}}{_short(option)}" for text, option in zip(names, hidden, strict=True)]
+            command.epilog = "\n".join(["\b", _("More, which `sprag {group} -h` explains:", group=name), *lines])
         if hasattr(command, "commands"):
             _list_once(command, name, options)
+
+
+def _short(option: Any) -> str:
+    """The first part of the help of an option, which says what it is."""
+    text = _(" ".join((option.help or "").split()))
+    return _PART.split(text, maxsplit=1)[0]
 
 
 class Groups(TyperGroup):
@@ -143,7 +160,7 @@ def common_first(line: Sequence[str]) -> tuple[list[str], list[str]]:
             rest += [word, *words]
         elif name in _ANYWHERE or (not rest and word.startswith("-")):
             front.append(word)
-            if not equals and (_ANYWHERE.get(name) or name in _BEFORE):
+            if not equals and _ANYWHERE.get(name):
                 value = next(words, None)
                 if value is None:
                     return front, []

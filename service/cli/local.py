@@ -24,6 +24,7 @@ from sprag_study.service.cli.console import (
     say,
     show_table,
     state_text,
+    table_words,
     warning_lines,
     write_json,
     write_text,
@@ -33,7 +34,6 @@ from sprag_study.service.cli.file_formats import TableFormOption, require_csv, r
 from sprag_study.service.cli.files import naming_points, output, read_spec, read_study, to_file
 from sprag_study.service.cli.options import (
     Appendix,
-    ChunkCases,
     CsvDecimal,
     CsvHeader,
     FinishBy,
@@ -78,7 +78,6 @@ def check(
     db: Annotated[
         str | None, typer.Option("--db", metavar="URL", help="Database to search for cases that it already has.")
     ] = None,
-    processes: Processes = None,
     finish_by: FinishBy = None,
 ) -> None:
     """Check a spec: every fault and warning, then the number of cases, time and size. Nothing is run.
@@ -87,9 +86,9 @@ def check(
     """
     finish, settings = _finish(finish_by), None
     if names_service():
-        refuse_here(db=db, processes=processes)
+        refuse_here(db=db)
     else:
-        settings = read_settings(database=db, processes=processes)
+        settings = read_settings(database=db)
     try:
         if settings is None:
             made = _asked(spec, points, tables, finish_by)
@@ -107,16 +106,17 @@ def check(
     _show_preview(made)
     if made["reusable"]:
         write_text(_("{count} of the cases need not be run: the database has them", count=made["reusable"]) + "\n")
-    heads = ((_("axis"), False), (_("unit"), False), (_("values"), True), (_("least"), True), (_("largest"), True))
-    rows = [
-        (", ".join(axis["paths"]), axis["unit"], axis["values"], axis["least"], axis["largest"])
-        for axis in made["axes"]
-    ]
-    if rows:
-        show_table(_("Axes"), heads, rows)
-    if made["derive"]:
-        columns = ((_("parameter"), False), (_("formula, SI"), False))
-        show_table(_("Derived parameters"), columns, [*made["derive"].items()])
+    with table_words():
+        heads = ((_("axis"), False), (_("unit"), False), (_("values"), True), (_("least"), True), (_("largest"), True))
+        rows = [
+            (", ".join(axis["paths"]), axis["unit"], axis["values"], axis["least"], axis["largest"])
+            for axis in made["axes"]
+        ]
+        if rows:
+            show_table(_("Axes"), heads, rows)
+        if made["derive"]:
+            columns = ((_("parameter"), False), (_("formula, SI"), False))
+            show_table(_("Derived parameters"), columns, [*made["derive"].items()])
     say(*warning_lines(made["warnings"], made["warning_codes"]))
 
 
@@ -200,8 +200,9 @@ def presets(
         if wants_json():
             write_json({"presets": list(names), "about": {item: asdict(ABOUT[item]) for item in names}})
         else:
-            columns = ((_("preset"), False, True), (_("shows"), False))
-            show_table("", columns, [(item, _(ABOUT[item].shows)) for item in names])
+            with table_words():
+                columns = ((_("preset"), False, True), (_("shows"), False))
+                show_table("", columns, [(item, _(ABOUT[item].shows)) for item in names])
         return
     if name not in names:
         message = N_("unknown preset")
@@ -240,7 +241,6 @@ def run(
     appendix: Appendix = None,
     db: KeptIn = None,
     processes: Processes = None,
-    chunk: ChunkCases = None,
     fresh: Fresh = False,
     finish_by: FinishBy = None,
 ) -> None:
@@ -251,7 +251,7 @@ def run(
     finish, written = _finish(finish_by), table_format(form, file)
     require_csv(header, decimal, written)
     require_report(appendix, written)
-    settings = read_settings(database=db, processes=processes, chunk_cases=chunk)
+    settings = read_settings(database=db, processes=processes)
     parsed = read_study(spec, points, partial(_with_start, settings) if db is not None else None, tables)
     _say_warnings(parsed)
     start = time.monotonic()

@@ -16,6 +16,15 @@ _VIEWS: Final = (
 )  # fmt: skip
 #: What settings of a case are called as options, where this is not their name.
 _OPTIONS: Final = {("diagram", "points"): "values", ("basin", "points"): "grid"}
+#: Options that commands had, and what says the same.
+_GONE: Final = {
+    ("show", "--processes"): "SPRAG_PROCESSES",
+    ("check", "--processes"): "SPRAG_PROCESSES",
+    ("show", "--format"): "--json",
+    ("run", "--chunk"): "SPRAG_CHUNK_CASES",
+    ("serve", "--chunk"): "SPRAG_CHUNK_CASES",
+    ("admin worker", "--processes"): "SPRAG_PROCESSES",
+}
 #: The new name by the old one; ID is the argument, which stands behind both.
 OLD: Final = {
     "validate": "check",
@@ -33,6 +42,9 @@ OLD: Final = {
 def forwarded(words: Sequence[str]) -> tuple[list[str], str]:
     """The words of today for those of a command line, and the new name where the old one was used, else ``""``."""
     name, rest = (words[0], list(words[1:])) if words else ("", [])
+    place = 0 if name == "db" else 1
+    if list(words[place : place + 2]) == ["db", "audit"] and name in ("db", "admin"):
+        return ["admin", "audit", *words[place + 2 :]], "admin audit"
     if name not in OLD:
         return list(words), ""
     new = [word for word in OLD[name].split() if word != "ID"]
@@ -60,3 +72,25 @@ def _of_case(words: Sequence[str]) -> list[str]:
             named.append(word)
     study, number, view = [*named, *[""] * 3][:3]
     return [view or "case", *filter(None, [study]), *(["--case", number] if number else []), *options, *named[3:]]
+
+
+def without_gone(words: Sequence[str]) -> tuple[list[str], dict[str, str], list[tuple[str, str]]]:
+    """The words without options that are gone, settings in their place, and each such option with what replaces it."""
+    kept: list[str] = []
+    settings: dict[str, str] = {}
+    gone: list[tuple[str, str]] = []
+    names = (" ".join(words[:1]), " ".join(words[:2]))
+    rest = iter(words)
+    for word in rest:
+        option, equals, value = word.partition("=")
+        instead = next((_GONE[name, option] for name in names if (name, option) in _GONE), None)
+        if instead is None:
+            kept.append(word)
+            continue
+        value = value if equals else next(rest, "")
+        gone.append((option, instead))
+        if not instead.startswith("--"):
+            settings[instead] = value
+        elif value == "json":
+            kept.append(instead)
+    return kept, settings, gone

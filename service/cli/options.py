@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 import math
-from enum import StrEnum
 from typing import Annotated, Any, Final
 
 import typer
 
 from sprag_study.service.cli import completion
+from sprag_study.service.cli.common import CURRENT
 from sprag_study.service.formats import Decimal, Header
 from sprag_study.service.views.study_questions import CHAPTERS
 from sprag_study.worker.limits import MAX_STARTS
-
-
-class ValueFormat(StrEnum):
-    """Formats of instantaneous values."""
-
-    CSV = "csv"
-    JSON = "json"
-
 
 SpecFile = Annotated[
     str,
@@ -37,9 +29,6 @@ CaseOption = Annotated[int, typer.Option("--case", min=0, metavar="N", help="Num
 StartOption = Annotated[
     int | None,
     typer.Option("--start", min=0, max=MAX_STARTS - 1, metavar="K", help="Start of a case with many; default: 0."),
-]
-ValueFormatOption = Annotated[
-    ValueFormat | None, typer.Option("--format", help="Default: by the ending of FILE; csv where it has none.")
 ]
 TableFiles = Annotated[
     list[str] | None,
@@ -77,11 +66,8 @@ FileUnits = Annotated[
     typer.Option(
         "--units",
         metavar="UNITS",
-        help='Units of FILE: si, typed (those of the spec), or a list such as "rpm, mm, torque=N*mm"; default: SI.',
+        help='Units of tables: si, typed (those of the spec), or a list such as "rpm, mm, torque=N*mm"; default: SI.',
     ),
-]
-PictureLanguage = Annotated[
-    str | None, typer.Option("--language", metavar="CODE", help="Language of a picture, such as uk; default: English.")
 ]
 StudyId = Annotated[
     str,
@@ -110,13 +96,6 @@ KeptIn = Annotated[
 Processes = Annotated[
     int | None, typer.Option("--processes", min=1, max=1024, help="Processes of the pool; default: one for each core.")
 ]
-ChunkCases = Annotated[
-    int | None,
-    typer.Option(
-        "--chunk", min=1, max=1_000_000, help="Cases a process takes at a time; default: about a second of work."
-    ),
-]
-
 Fresh = Annotated[
     bool, typer.Option("--fresh", help="Run every case, including those that other studies already have.")
 ]
@@ -161,8 +140,9 @@ def in_decimals(decimal: Decimal | None) -> list[tuple[str, str]]:
     return [] if decimal is None else [("decimal", decimal)]
 
 
-def in_language(language: str | None) -> list[tuple[str, str]]:
-    """The language of a picture as a query."""
+def in_language() -> list[tuple[str, str]]:
+    """The language of a picture as a query: that of --language, not that of the system."""
+    language = CURRENT.get().language
     return [] if language is None else [("language", language)]
 
 
@@ -172,14 +152,13 @@ SHARED: Final[dict[str, Any]] = {
         str | None,
         typer.Option("-o", "--output", metavar="FILE", help="File to write: .csv, .svg, .png, .pdf; .json of a case."),
     ],
-    "form": ValueFormatOption,
     "units": FileUnits,
     "decimal": CsvDecimal,
-    "language": PictureLanguage,
     "case": CaseOption,
     "start": StartOption,
     "points_file": PointsFile,
     "tables": TableFiles,
     "db": KeptIn,
-    "processes": Processes,
 }
+#: Those of a spec that is run here.
+OF_SPEC: Final = ("points_file", "tables", "db")

@@ -12,7 +12,7 @@ from sprag_study.service import languages
 from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.configured import read_settings
 from sprag_study.service.cli.console import TroubleError, WrongInputError, write_json
-from sprag_study.service.cli.options import ChunkCases, Database, Processes
+from sprag_study.service.cli.options import Database, Processes
 from sprag_study.service.cli.stores import database_of
 
 Host = Annotated[
@@ -33,7 +33,6 @@ def serve(
     port: Port = None,
     db: Database = None,
     processes: Processes = None,
-    chunk: ChunkCases = None,
     tls_certificate: TlsCertificate = None,
     tls_key: TlsKey = None,
 ) -> None:
@@ -52,7 +51,6 @@ def serve(
         port=port,
         database=db,
         processes=processes,
-        chunk_cases=chunk,
         tls_certificate=tls_certificate,
         tls_key=tls_key,
     )
@@ -72,7 +70,6 @@ def serve(
 
 def worker(
     db: Database = None,
-    processes: Processes = None,
     take_over: Annotated[
         bool,
         typer.Option(
@@ -86,7 +83,7 @@ def worker(
     from sprag_study.service import logs
     from sprag_study.service.jobs.dispatching import run_dispatcher, stop_on_signals, worker_settings
 
-    settings = read_settings(database=db, processes=processes)
+    settings = read_settings(database=db)
     database_of(db)
     logs.configure(settings.log_format, requests=False)
     with languages.language(languages.ENGLISH):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sprag_study.service.cli.common import wants_json
-from sprag_study.service.cli.console import show_table, write_json, wrong_option
+from sprag_study.service.cli.console import show_table, table_words, write_json, wrong_option
 from sprag_study.service.cli.files import require_cases
 from sprag_study.service.cli.options import CaseOption, PointsFile, TableFiles
 from sprag_study.service.cli.remote import study_named
@@ -45,8 +45,9 @@ def regimes(spec: SpecOrStudy, case: CaseOption = 0, points_file: PointsFile = N
     if wants_json():
         write_json({"case": case, "ending": done.endings[0], "regimes": rows})
         return
-    show_table(
-        _("Case {case}: {count} starts", case=case, count=study.run["starts"]["count"]),
-        [(name.removeprefix("regime."), name != "regime") for name in _SHOWN],
-        [tuple(row.values()) for row in rows],
-    )
+    with table_words():
+        show_table(
+            _("Case {case}: {count} starts", case=case, count=study.run["starts"]["count"]),
+            [(name.removeprefix("regime."), name != "regime") for name in _SHOWN],
+            [tuple(row.values()) for row in rows],
+        )

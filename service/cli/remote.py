@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
 from sprag_study.service.cli.common import access, token_sentences, wants_json
+from sprag_study.service.cli.configured import read_settings
 from sprag_study.service.cli.console import (
     CommandFailureError,
     TroubleError,
     WrongInputError,
     cell_text,
+    say,
     show_table,
+    table_words,
+    tables_in,
     time_text,
+    warning_lines,
     write_json,
 )
 from sprag_study.service.cli.files import naming_points, read_spec, read_study
@@ -27,21 +33,25 @@ from sprag_study.service.cli.options import (
     Fresh,
     KeptIn,
     PointsFile,
-    Processes,
     SpecFile,
-    StudyId,
     TableFiles,
     Wait,
     WaitTimeout,
 )
+from sprag_study.service.cli.running import run_parsed
 from sprag_study.service.cli.sources import SpecOrStudy, is_study, refuse_local
-from sprag_study.service.faults import Fault, Kind
+from sprag_study.service.cli.stores import require_store
+from sprag_study.service.faults import Fault, FaultError, Kind
 from sprag_study.service.languages import _, earlier
 from sprag_study.service.login import Access
 from sprag_study.worker.limits import MAX_BODY_BYTES, MAX_PRIORITY
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from sprag_study.service.client import Client, RefusedError
+    from sprag_study.service.client.synchronous.connection import Connection
+    from sprag_study.service.reading.reader import Reading
     from sprag_study.service.spec.document import ParsedSpec
 
 #: A parameter as in the service's messages: "by=", "at=shaft.load=0.2".
@@ -63,9 +73,21 @@ def connection() -> Iterator[Client]:
 @contextmanager
 def served_by(access: Access) -> Iterator[Client]:
     """A client of a service; its errors become failures of the command."""
+    from sprag_study.service.client import Client
+
+    try:
+        client = Client(access.server, access.token)
+    except ValueError as error:
+        raise WrongInputError("invalid-parameter", str(error)) from error
+    with client, _failing(access):
+        yield client
+
+
+@contextmanager
+def _failing(access: Access | None = None) -> Iterator[None]:
+    """Errors of a connection as failures of the command."""
     from sprag_study.service.client import (
         ArgumentError,
-        Client,
         RefusedError,
         StudyTimeoutError,
         UnreachableError,
@@ -73,33 +95,27 @@ def served_by(access: Access) -> Iterator[Client]:
     )
 
     try:
-        client = Client(access.server, access.token)
-    except ValueError as error:
-        raise WrongInputError("invalid-parameter", str(error)) from error
-    with client:
-        try:
-            yield client
-        except UntrustedError as error:
-            raise TroubleError(
-                "unreachable",
-                f"{error}; SSL_CERT_FILE names a PEM file with the certificate of its issuer.",
-            ) from error
-        except UnreachableError as error:
-            raise TroubleError(
-                "unreachable",
-                _(
-                    "No Sprag service at {address} ({why}); start one with `sprag serve` or name another with "
-                    "--server.",
-                    address=error.address,
-                    why=error.reason,
-                ),
-            ) from error
-        except RefusedError as error:
-            raise refusal(error, access) from error
-        except ArgumentError as error:
-            raise WrongInputError("invalid-parameter", _("invalid argument"), error.faults) from error
-        except StudyTimeoutError as error:
-            raise TroubleError("not-done", _("{what}; it continues.", what=error)) from error
+        yield
+    except UntrustedError as error:
+        raise TroubleError(
+            "unreachable",
+            f"{error}; SSL_CERT_FILE names a PEM file with the certificate of its issuer.",
+        ) from error
+    except UnreachableError as error:
+        raise TroubleError(
+            "unreachable",
+            _(
+                "No Sprag service at {address} ({why}); start one with `sprag serve` or name another with --server.",
+                address=error.address,
+                why=error.reason,
+            ),
+        ) from error
+    except RefusedError as error:
+        raise refusal(error, access) from error
+    except ArgumentError as error:
+        raise WrongInputError("invalid-parameter", _("invalid argument"), error.faults) from error
+    except StudyTimeoutError as error:
+        raise TroubleError("not-done", _("{what}; it continues.", what=error)) from error
 
 
 def refusal(error: RefusedError, access: Access | None = None) -> CommandFailureError:
@@ -134,6 +150,56 @@ def _option(parameter: object) -> str:
     return "--" + str(parameter).replace("_", "-")
 
 
+@contextmanager
+def opened(
+    text: str, *, points: str | None = None, tables: list[str] | None = None, db: str | None = None,
+    change: Callable[[object], object] | None = None, check: Callable[[ParsedSpec], None] | None = None, **of_spec: Any,
+) -> Iterator[tuple[Connection, str]]:  # fmt: skip
+    """Who is asked about a study, and its id: a service, or the database in which the study of a spec is run first.
+
+    ``change`` completes the spec, ``check`` looks at its study before it is run; ``of_spec`` are further options that
+    only a spec has.
+    """
+    if is_study(text):
+        refuse_local(**of_spec, points_file=points, tables=tables, db=db)
+        with connection() as client:
+            yield client, study_of(client, text)
+        return
+    require_store(db)
+    parsed = read_study(text, points, change, tables)
+    say(*warning_lines(parsed.warnings))
+    if check is not None:
+        check(parsed)
+    from sprag_study.service.here import Here
+
+    settings = read_settings(database=db)
+    with _failing(), run_parsed(parsed, settings, db=db) as done:
+        yield Here(done.store, settings), done.record.id
+
+
+@contextmanager
+def read_in(source: Connection, study_id: str, units: str | None) -> Iterator[Reading]:
+    """How a study of `opened` is read on a terminal; tables within the block have its units.
+
+    Raises WrongInputError for units that it has not.
+    """
+    from sprag_study.service.client.wire import study_path
+    from sprag_study.service.reading.reader import Choice, Reading, reading_for  # knows the models
+    from sprag_study.service.spec.document import parse_spec
+
+    detail = source.request("GET", study_path(study_id))
+    reading = Reading(detail["model"])
+    if units is not None:
+        parsed = parse_spec(detail["spec"])
+        try:
+            reading = reading_for(parsed.study, parsed.spec, Choice(units))
+        except FaultError as error:
+            faults = [replace(fault, where="--units") for fault in error.faults]
+            raise WrongInputError("invalid-parameter", _("invalid option"), faults) from error
+    with tables_in(reading.units):
+        yield reading
+
+
 def submit(
     spec: SpecFile,
     points: PointsFile = None,
@@ -163,7 +229,6 @@ def state(
     points_file: PointsFile = None,
     tables: TableFiles = None,
     db: KeptIn = None,
-    processes: Processes = None,
 ) -> None:
     """Show the state of a study: how far it is, how it ended, where it runs; of a spec what it would be."""
     from sprag_study.service.client.wire import study_path
@@ -171,9 +236,9 @@ def state(
     if not is_study(study_id):
         from sprag_study.service.cli.local import check
 
-        check(study_id, points_file, tables, db, processes)
+        check(study_id, points_file, tables, db)
         return
-    refuse_local(points_file=points_file, tables=tables, db=db, processes=processes)
+    refuse_local(points_file=points_file, tables=tables, db=db)
     with connection() as client:
         show_study(client.request("GET", study_path(study_of(client, study_id))))
 
@@ -190,28 +255,46 @@ def study_named(text: str, points: str | None, tables: list[str] | None) -> Pars
         return parse_spec(client.request("GET", study_path(study_of(client, text)))["spec"])
 
 
-def rounds(study_id: StudyId) -> None:
+def views_of(text: str, names: Iterable[str]) -> list[str]:
+    """Those of the views by these names that a study has; all where it cannot be asked."""
+    from sprag_study.service.views.cases import CASE_VIEWS
+    from sprag_study.service.views.studies import STUDY_VIEWS
+
+    views: dict[str, Any] = {**STUDY_VIEWS, **CASE_VIEWS}
+    try:
+        study = study_named(text, None, None).study
+    except CommandFailureError:
+        return [*names]
+    return [name for name in names if name not in views or views[name].has(study)]
+
+
+def rounds(
+    study: SpecOrStudy,
+    points_file: PointsFile = None,
+    tables: TableFiles = None,
+    db: KeptIn = None,
+) -> None:
     """List the rounds of a study that chooses its own cases, with what was known before each."""
     from sprag_study.service.client.wire import study_path
 
-    with connection() as client:
-        study_id = study_of(client, study_id)
-        found = client.request("GET", f"{study_path(study_id)}/rounds")
+    with opened(study, points=points_file, tables=tables, db=db) as (source, study_id):
+        found = source.request("GET", f"{study_path(study_id)}/rounds")
     if wants_json():
         write_json(found)
         return
-    columns = (
-        (_("round"), True),
-        (_("first case"), True),
-        (_("cases"), True),
-        (_("planned"), False),
-        (_("known before"), False),
-    )
-    rows = [
-        (r["round"], r["first_case"], r["cases"], time_text(r["planned_at"]), _known(r["summary"]))
-        for r in found["rounds"]
-    ]
-    show_table("", columns, rows)
+    with table_words():
+        columns = (
+            (_("round"), True),
+            (_("first case"), True),
+            (_("cases"), True),
+            (_("planned"), False),
+            (_("known before"), False),
+        )
+        rows = [
+            (r["round"], r["first_case"], r["cases"], time_text(r["planned_at"]), _known(r["summary"]))
+            for r in found["rounds"]
+        ]
+        show_table("", columns, rows)
 
 
 def _known(summary: dict[str, Any]) -> str:

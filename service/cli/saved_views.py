@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 import typer
 
 from sprag_study.service.cli.common import wants_json
-from sprag_study.service.cli.console import say, show_table, write_json, wrong_option
+from sprag_study.service.cli.console import say, show_table, table_words, write_json, wrong_option
 from sprag_study.service.cli.groups import Groups
 from sprag_study.service.cli.remote import connection
 from sprag_study.service.languages import N_, _
@@ -30,10 +30,11 @@ def list_views(
     if wants_json():
         write_json(found)
         return
-    columns = ((_("id"), False, True), (_("figure"), True), (_("name"), False), (_("address"), False))
-    rows = [(one["id"], "" if one["place"] is None else str(one["place"]), one["name"], one["address"])
-            for one in found["views"]]  # fmt: skip
-    show_table("", columns, rows)
+    with table_words():
+        columns = ((_("id"), False, True), (_("figure"), True), (_("name"), False), (_("address"), False))
+        rows = [(one["id"], "" if one["place"] is None else str(one["place"]), one["name"], one["address"])
+                for one in found["views"]]  # fmt: skip
+        show_table("", columns, rows)
 
 
 @app.command()

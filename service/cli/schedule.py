@@ -12,8 +12,10 @@ from sprag_study.service.cli.console import (
     ExitCode,
     WrongInputError,
     duration_text,
+    piped,
     say,
     show_table,
+    table_words,
     write_json,
     wrong_option,
 )
@@ -178,13 +180,16 @@ def list_schedules() -> None:
     if wants_json():
         write_json(found)
         return
-    heads = (_("id"), _("when"), _("window"), _("finish by"), _("last run"), _("next run"), _("name"))
-    columns = [(head, False, place == 0) for place, head in enumerate(heads)]
-    rows = []
-    for s in found["schedules"]:
-        window = "-".join(s["window"] or ()) or None
-        rows.append((s["id"], _when(s), window, s["finish_by"], _run(s["last_run"]), _next(s), s["name"]))
-    show_table("", columns, rows)
+    with table_words():
+        heads = (_("id"), _("when"), _("window"), _("finish by"), _("last run"), _("next run"), _("name"))
+        columns = [(head, False, place == 0) for place, head in enumerate(heads)]
+        rows = []
+        for s in found["schedules"]:
+            window = "-".join(s["window"] or ()) or None
+            last = s["last_run"]
+            times = (last and last["due_local"], s["next_due_local"]) if piped() else (_run(last), _next(s))
+            rows.append((s["id"], _when(s), window, s["finish_by"], *times, s["name"]))
+        show_table("", columns, rows)
     _say_off(found)
 
 
@@ -199,10 +204,10 @@ def show(schedule_id: ScheduleId) -> None:
         write_json(schedule)
         return
     _show(schedule)
-    columns = ((_("due"), False), (_("missed before"), True), (_("study"), False, True), (_("problem"), False))
-    show_table(
-        "", columns, [(_clock(r["due_local"]), r["missed"], r["study"], _known(r["problem"])) for r in schedule["runs"]]
-    )
+    with table_words():
+        columns = ((_("due"), False), (_("missed before"), True), (_("study"), False, True), (_("problem"), False))
+        runs = schedule["runs"]
+        show_table("", columns, [(_cell(r["due_local"]), r["missed"], r["study"], _known(r["problem"])) for r in runs])
 
 
 @app.command()
@@ -218,10 +223,12 @@ def night(
     if wants_json():
         write_json(found)
     else:
-        columns = ((_("due"), False), (_("schedule"), False), (_("outcome"), False), (_("study"), False, True))
-        rows = [(_clock(r["due_local"]), r["name"], _(r["sentence"]), r["study"]) for r in found["late"]]
-        rows += [(_clock(r["due_local"]), r["name"], _(r["outcome"]["sentence"]), r["study"]) for r in found["runs"]]
-        show_table("", columns, rows)
+        with table_words():
+            columns = ((_("due"), False), (_("schedule"), False), (_("outcome"), False), (_("study"), False, True))
+            listed = [(run, run["sentence"]) for run in found["late"]]
+            listed += [(run, run["outcome"]["sentence"]) for run in found["runs"]]
+            rows = [(_cell(run["due_local"]), run["name"], _(sentence), run["study"]) for run, sentence in listed]
+            show_table("", columns, rows)
         if stages:
             _show_stages(found["runs"])
         _say_off(found)
@@ -229,6 +236,7 @@ def night(
         raise typer.Exit(ExitCode.NOT_ALL_OK)
 
 
+@table_words()
 def _show_stages(runs: list[dict[str, Any]]) -> None:
     """Show how long each stage of the runs took that are over."""
     columns = (
@@ -240,9 +248,9 @@ def _show_stages(runs: list[dict[str, Any]]) -> None:
             run["name"] or run["schedule"],
             run["study"],
             _(STAGE_NAMES[stage["stage"]]),
-            _clock(stage["begin_local"], seconds=True),
-            _clock(stage["end_local"], seconds=True),
-            duration_text(stage["seconds"]),
+            _cell(stage["begin_local"], seconds=True),
+            _cell(stage["end_local"], seconds=True),
+            stage["seconds"] if piped() else duration_text(stage["seconds"]),
         )
         for run in runs
         for stage in run["stages"] or ()
@@ -399,6 +407,11 @@ def _say_off(found: dict[str, Any]) -> None:
 def _known(text: str | None) -> str | None:
     """A sentence of the service in the language of the task, where the catalogue has it."""
     return earlier.said(_(text)) if text else text
+
+
+def _cell(text: str, *, seconds: bool = False) -> str:
+    """A time in a table: on the wall clock, for programs as it comes."""
+    return text if piped() else _clock(text, seconds=seconds)
 
 
 def _clock(text: str, *, seconds: bool = False) -> str:

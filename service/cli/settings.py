@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.configured import read_settings
-from sprag_study.service.cli.console import WrongInputError, show_table, write_json
+from sprag_study.service.cli.console import WrongInputError, show_table, table_words, write_json
 from sprag_study.service.faults import Fault
 from sprag_study.service.languages import N_, _
 from sprag_study.service.login import DEFAULT_SERVER, profile, profile_file
@@ -51,7 +51,8 @@ def settings() -> None:
     if wants_json():
         write_json({"settings": [asdict(row) for row in rows]})
     else:
-        show_table("", ((_("setting"), False, True), (_("value"), False), (_("origin"), False)), map(_cells, rows))
+        with table_words():
+            show_table("", ((_("setting"), False, True), (_("value"), False), (_("origin"), False)), map(_cells, rows))
 
 
 def _of_commands() -> Iterator[EffectiveSetting]:

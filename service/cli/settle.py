@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sprag_study.service.cli.common import wants_json
-from sprag_study.service.cli.console import ExitCode, progress_bar, say, show_table, write_json, wrong_option
+from sprag_study.service.cli.console import (
+    ExitCode,
+    piped,
+    progress_bar,
+    say,
+    show_table,
+    table_words,
+    write_json,
+    wrong_option,
+)
 from sprag_study.service.cli.file_formats import require_csv
 from sprag_study.service.cli.files import output, require_cases, to_file
 from sprag_study.service.cli.options import CsvDecimal, OutputFile, PointsFile, TableFiles
@@ -164,13 +173,16 @@ def _show(block: RowBlock, starts: int) -> None:
         meaning = f"{meaning} {said(coasting)}"
     if others:
         meaning = _("{count} regimes, to which its {starts} starts come", count=len(block), starts=starts)
+    title = _("Case {case}: {text}", case=first.case, text=meaning)
+    if piped():
+        say(title)
     values = zip(block.infos, block.values.T.tolist(), strict=True)
     rows = [
         (info.name, *("" if math.isnan(value) else info.cell(value) for value in own), info.unit)
         for info, own in values
-        if any(map(math.isfinite, own))
+        if piped() or any(map(math.isfinite, own))
     ]
-    heads = [_("regime {number}", number=number) for number in range(len(block))] if others else [_("value")]
-    shown = [(head, True) for head in heads]
-    title = _("Case {case}: {text}", case=first.case, text=meaning)
-    show_table(title, [(_("result"), False, True), *shown, (_("unit"), False)], rows)
+    with table_words():
+        heads = [_("regime {number}", number=number) for number in range(len(block))] if others else [_("value")]
+        shown = [(head, True) for head in heads]
+        show_table(title, [(_("result"), False, True), *shown, (_("unit"), False)], rows)

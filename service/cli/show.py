@@ -8,11 +8,13 @@ from typing import Any, Final
 import typer
 from typer._click.shell_completion import CompletionItem
 
+from sprag_study.sentences import Sentence
 from sprag_study.service.cli import case_views, cases, completion, regimes, remote, settle, sql, study_views
+from sprag_study.service.cli.console import WrongInputError, wrong_option
 from sprag_study.service.cli.described import listing
 from sprag_study.service.cli.groups import Groups
 from sprag_study.service.cli.options import SHARED
-from sprag_study.service.languages import N_
+from sprag_study.service.languages import N_, _
 
 #: Whether something is named already, for completion.
 _NAMED: Final = f"{__name__}.named"
@@ -27,10 +29,20 @@ class _Views(Groups):
         place = next((place for place, word in enumerate(args) if word in self.commands), None)
         if place is None:
             itself = args and not args[0].startswith("-") and not ctx.resilient_parsing
+            if itself and args[1:] and not args[1].startswith("-"):
+                raise self._no_view(args[0], args[1])
             return super().parse_args(ctx, ["state", *args] if itself else args)
         if place + 1 < len(args) and args[place + 1] in self.commands:  # a study of that name
             place += 1
         return super().parse_args(ctx, [args[place], *args[:place], *args[place + 1 :]])
+
+    def _no_view(self, study: str, name: str) -> WrongInputError:
+        """The refusal of a view that there is not: it names the nearest, and those that the study has."""
+        from sprag_study.service.reading.texts import did_you_mean
+
+        message = Sentence("is no view{hint}", hint=did_you_mean(name, self.commands))
+        allowed = ", ".join(remote.views_of(study, self.commands))
+        return wrong_option("WHAT", "unknown-name", message, name, allowed=allowed, detail=_("invalid argument"))
 
     def shell_complete(self, ctx: Any, incomplete: str) -> Any:
         """The views, and before one the studies of the service."""

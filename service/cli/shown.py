@@ -3,16 +3,28 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
-from sprag_study.service.cli.console import OK, Column, cell_text, say, show_table, warning_lines, write_text
+from sprag_study.service.cli.console import (
+    OK,
+    Column,
+    Heading,
+    cell_text,
+    heading,
+    in_unit,
+    piped,
+    say,
+    show_table,
+    unit_of,
+    warning_lines,
+    write_rows,
+    write_text,
+)
 from sprag_study.service.languages import N_, _, decimal
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from sprag_study.service.answers import Value
     from sprag_study.service.answers.key import AnswerValue
     from sprag_study.service.reading.reader import Reading
@@ -29,11 +41,19 @@ def show_map(found: dict[str, Any]) -> None:
     if "points" in found:
         _show_points(found, title)
         return
-    corner = f"{heading(found['y']['path'], found['y']['unit'])} \\ {heading(found['x']['path'], found['x']['unit'])}"
-    columns = [(corner, True), *((cell_text(value), True) for value in found["x"]["values"])]
+    x, y, unit = found["x"], found["y"], found["z"]["unit"]
+    corner = Heading(f"{heading(y['path'], y['unit'])} \\ {heading(x['path'], x['unit'])}", y["unit"])
+    columns: list[Column] = [(corner, True)]
+    columns += [(Heading(cell_text(in_unit(value, x["unit"])), unit), True) for value in x["values"]]
     doubtful = found.get("flags") or [[[] for _ in found["x"]["values"]] for _ in found["y"]["values"]]
     rows = [
-        (y, *(f"{cell_text(value)} *" if flags else value for value, flags in zip(row, own, strict=True)))
+        (
+            y,
+            *(
+                f"{cell_text(in_unit(value, unit))} *" if flags else value
+                for value, flags in zip(row, own, strict=True)
+            ),
+        )
         for y, row, own in zip(found["y"]["values"], found["z"]["values"], doubtful, strict=True)
     ]
     show_table(title, columns, rows)
@@ -45,7 +65,7 @@ def show_map(found: dict[str, Any]) -> None:
 def _show_points(found: dict[str, Any], title: str) -> None:
     """The cases of a refined map, and how right it is."""
     points, axes = found["points"], (found["x"], found["y"])
-    columns = [*((heading(axis["path"], axis["unit"]), True) for axis in axes)]
+    columns: list[Column] = [*((heading(axis["path"], axis["unit"]), True) for axis in axes)]
     columns += [(heading(found["z"]["name"], found["z"]["unit"]), True), (_("case"), True)]
     show_table(title, columns, list(zip(points["x"], points["y"], points["z"], points["cases"], strict=True)))
     asked, jumps = _percent(found["error_asked"]), _percent(found["jumps_share"])
@@ -79,8 +99,10 @@ def _show_effects(result: dict[str, Any]) -> None:
     named = heading(result["result"], result["unit"])
     title = _("{result}: {cases} cases, {way}", result=named, cases=result["cases"], way=way)
     names = _ELEMENTARY if result["method"] == "morris" else _SHARES
-    columns = [(_("axis"), False), *((_(name), True) for name in names.values())]
-    columns += [(_("least mean"), True), (_("largest mean"), True)]
+    unit = result["unit"]
+    of_names = unit if result["method"] == "morris" else "1"
+    columns: list[Column] = [(_("axis"), False), *((Heading(_(name), of_names), True) for name in names.values())]
+    columns += [(Heading(_(name), unit), True) for name in (N_("least mean"), N_("largest mean"))]
     rows = []
     for effect in result["effects"]:
         means = [value for value in effect["means"] if value is not None]
@@ -101,7 +123,7 @@ def show_curves(found: Mapping[str, Any], of: str = "") -> None:
     ``of`` is the name of its study, where there are several.
     """
     x = found["x"]
-    columns = [(heading(x["path"], x["unit"]), True)]
+    columns: list[Column] = [(heading(x["path"], x["unit"]), True)]
     columns += [(heading(name, result["unit"]), True) for name, result in found["results"].items()]
     settled = all("regime" in drawn for drawn in found["curves"])
     doubts = [_doubts(drawn) for drawn in found["curves"]]
@@ -118,6 +140,21 @@ def show_curves(found: Mapping[str, Any], of: str = "") -> None:
         elif "jumps" in drawn:
             places = ((_ends(jump, x["unit"]), _(jump["why"])) for jump in drawn["jumps"])
             say(*(_("jump at {place} ({why})", place=place, why=why) for place, why in places))
+
+
+def write_curves(named: Sequence[tuple[str, Mapping[str, Any]]]) -> None:
+    """The points of the curves of several studies for programs: a row each, with the study and what is held."""
+    first = named[0][1]
+    heads = ["study", "held", heading(first["x"]["path"], first["x"]["unit"])]
+    heads += [heading(name, result["unit"]) for name, result in first["results"].items()]
+    rows = []
+    for study, found in named:
+        for drawn in found["curves"]:
+            held = held_text({**drawn["by"], **drawn["at"]}, found["units"])
+            regimes = drawn.get("regime") or [None] * len(drawn["x"])
+            points = zip(drawn["x"], *drawn["y"].values(), regimes, _doubts(drawn), drawn["endings"], strict=True)
+            rows += [(study, held, *point) for point in points]
+    write_rows([*heads, "regime", "flags", "ending"], rows)
 
 
 def _doubts(drawn: Mapping[str, Any]) -> list[str]:
@@ -139,19 +176,14 @@ def _refined(drawn: dict[str, Any], asked: float, unit: str) -> Iterator[str]:
 
 
 def _ends(jump: dict[str, Any], unit: str) -> str:
-    ends = _("{low} to {high}", low=cell_text(jump["low"]), high=cell_text(jump["high"]))
-    return ends + ("" if unit == "1" else f" {unit}")
+    low, high = (cell_text(in_unit(jump[end], unit)) for end in ("low", "high"))
+    return f"{_('{low} to {high}', low=low, high=high)} {unit_of(unit)}".rstrip()
 
 
 def held_text(values: Mapping[str, Value], units: Mapping[str, str]) -> str:
     """The held parameters with their values and units."""
-    texts = ((path, cell_text(value), units.get(path, "1")) for path, value in values.items())
-    return ", ".join(f"{path} = {value}" + ("" if unit == "1" else f" {unit}") for path, value, unit in texts)
-
-
-def heading(name: str, unit: str) -> str:
-    """A column's heading: the name with its unit."""
-    return name if unit == "1" else f"{name} [{unit}]"
+    known = ((path, value, units.get(path, "1")) for path, value in values.items())
+    return ", ".join(f"{path} = {cell_text(in_unit(value, si))} {unit_of(si)}".rstrip() for path, value, si in known)
 
 
 def show_ribbon(found: dict[str, Any]) -> None:
@@ -159,10 +191,10 @@ def show_ribbon(found: dict[str, Any]) -> None:
     for line in found["lines"]:
         held = held_text({**line["by"], **line["at"]}, found["units"])
         for name, result in line["results"].items():
-            result_title = heading(name, found["results"][name]["unit"])
-            title = _("{result}, {drives} drives", result=result_title, drives=found["drives"])
-            columns = [*_x_column(found), (_("nominal"), True)]
-            columns += [(f"{100.0 * p:g} %", True) for p in found["quantiles"]]
+            unit = found["results"][name]["unit"]
+            title = _("{result}, {drives} drives", result=heading(name, unit), drives=found["drives"])
+            columns: list[Column] = [*_x_column(found), (Heading(_("nominal"), unit), True)]
+            columns += [(Heading(f"{100.0 * p:g} %", unit), True) for p in found["quantiles"]]
             columns += [(_("failed"), True)]
             x = [line["x"]] if found["x"] else []
             rows = list(zip(*x, result["nominal"], *result["values"], line["failed"], strict=True))
@@ -205,7 +237,7 @@ def yield_text(share: dict[str, Any]) -> str:
     return _("{value} ({low} to {high}) of {drives} drives", value=value, low=low, high=high, drives=share["drives"])
 
 
-def _x_column(found: dict[str, Any]) -> list[tuple[str, bool]]:
+def _x_column(found: dict[str, Any]) -> list[Column]:
     return [(heading(found["x"]["path"], found["x"]["unit"]), True)] if found["x"] else []
 
 
@@ -223,11 +255,8 @@ def _share(share: float | None) -> str:
     return "" if share is None else f"{cell_text(round(100.0 * share, 1))} %"
 
 
-def show_answers(found: dict[str, Any], model: Callable[[], str]) -> None:
+def show_answers(found: dict[str, Any], reading: Reading) -> None:
     """A table for each curve: its answers and its working point; then the extremes among all cases."""
-    from sprag_study.service.reading.reader import Reading  # knows the models
-
-    reading = Reading(model())
     x = heading(found["x"] or "", found["unit"] or "1")
     columns: list[Column] = [
         (_("answer"), False, True),
@@ -255,13 +284,12 @@ def show_answers(found: dict[str, Any], model: Callable[[], str]) -> None:
 def _answer_row(item: AnswerValue, x_unit: str, reading: Reading) -> tuple[object, ...]:
     from sprag_study.service.results.key_answer_words import note_of
 
-    unit = "" if item["unit"] == "1" else item["unit"]
     title = reading.caption(item["title"]) if item["title"] == item["result"] else _(item["title"])
-    value: object = item["value"]
-    if item["above"] and item["value"] is not None:
-        value = f"> {cell_text(item['value'])}"
+    value = in_unit(item["value"], item["unit"])
+    if item["above"] and value is not None:
+        value = f"> {cell_text(value)}"
     cases, note = ", ".join(map(str, item["cases"])), note_of(item, x_unit).said(reading)
-    return title, value, unit, item["x"], cases, note
+    return title, value, unit_of(item["unit"]), item["x"], cases, note
 
 
 def show_designs(found: dict[str, Any]) -> None:
@@ -305,9 +333,9 @@ def _limited(found: dict[str, Any]) -> dict[str, str]:
     return {limit["result"]: limit["unit"] for limit in found["subject_to"] if limit["result"] not in goals}
 
 
-def _lines(name: str, unit: str) -> str:
+def _lines(name: str, unit: str) -> Heading:
     """The heading of a narrow column: a line for each part of the name, and one for the unit."""
-    return heading(name, unit).replace(".", ".\n").replace(" ", "\n")
+    return Heading(heading(name, unit).replace(".", ".\n").replace(" ", "\n"), unit)
 
 
 def show_cases(found: dict[str, Any]) -> None:
@@ -332,11 +360,13 @@ def show_calibration(found: dict[str, Any]) -> None:
     """Values with their intervals, correlations, and what to do next."""
     heads = (_("parameter"), _("value"), _("from"), _("to"), _("deviation"))
     columns = [(head, place > 0) for place, head in enumerate(heads)]
-    rows = [
-        (heading(one["name"], one["unit"]), one["value"], *(one["interval"] or (None, None)), one["deviation"])
-        for one in found["parameters"]
-    ]
+    rows = []
+    for one in found["parameters"]:
+        numbers = (one["value"], *(one["interval"] or (None, None)), one["deviation"])
+        rows.append((heading(one["name"], one["unit"]), *(in_unit(number, one["unit"]) for number in numbers)))
     show_table(_("Values and 95 % intervals"), columns, rows)
+    if piped():
+        return
     if found["correlations"] and len(rows) > 1:
         names = [one["name"] for one in found["parameters"]]
         lines = [(name, *row) for name, row in zip(names, found["correlations"], strict=True)]

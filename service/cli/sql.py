@@ -9,22 +9,16 @@ import typer
 
 from sprag_study.service.cli.case_views import say_file
 from sprag_study.service.cli.common import wants_json
-from sprag_study.service.cli.configured import read_settings
-from sprag_study.service.cli.console import WrongInputError, say, show_table, warning_lines, write_json
+from sprag_study.service.cli.console import WrongInputError, heading, show_table, write_json
 from sprag_study.service.cli.described import parameter, signed
 from sprag_study.service.cli.file_formats import file_format, require_csv
-from sprag_study.service.cli.files import read_study, write_pieces
-from sprag_study.service.cli.names import study_of
-from sprag_study.service.cli.options import SHARED
-from sprag_study.service.cli.remote import connection
-from sprag_study.service.cli.running import run_parsed
-from sprag_study.service.cli.shown import heading
-from sprag_study.service.cli.sources import SpecOrStudy, is_study, refuse_local
-from sprag_study.service.cli.stores import require_store
+from sprag_study.service.cli.files import write_pieces
+from sprag_study.service.cli.options import OF_SPEC, SHARED
+from sprag_study.service.cli.remote import opened
+from sprag_study.service.cli.sources import SpecOrStudy
 
 if TYPE_CHECKING:
     from sprag_study.service.formats import Decimal
-    from sprag_study.service.spec.document import ParsedSpec
 
 _Statement = Annotated[
     str,
@@ -34,13 +28,14 @@ _Statement = Annotated[
     ),
 ]
 
-_SHARED: Final = ("file", "units", "decimal", "points_file", "tables", "db", "processes")
+_SHARED: Final = ("file", "units", "decimal", *OF_SPEC)
 
 
 def _sql(
     study: str, statement: str, file: str | None, units: str | None, decimal: Decimal | None,
-    points_file: str | None, tables: list[str] | None, db: str | None, processes: int | None,
+    points_file: str | None, tables: list[str] | None, db: str | None,
 ) -> None:  # fmt: skip
+    from sprag_study.service.client import Study
     from sprag_study.service.client.errors import StatementError
     from sprag_study.service.client.statements import CASES, read_only, selected
 
@@ -48,12 +43,8 @@ def _sql(
     require_csv(None, decimal, form)
     try:
         read_only(statement)  # before anything is run
-        if is_study(study):
-            refuse_local(points_file=points_file, tables=tables, db=db, processes=processes)
-            parquet = _of_service(study, units)
-        else:
-            require_store(db)
-            parquet = _of_spec(read_study(study, points_file, files=tables), units, db, processes)
+        with opened(study, points=points_file, tables=tables, db=db) as (source, study_id):
+            parquet = Study(source, study_id).download("parquet", units)
         frame: Any = selected(statement, {CASES: parquet}, polars=False)
     except StatementError as error:
         raise WrongInputError("invalid-parameter", str(error)) from error
@@ -94,26 +85,6 @@ def _text(cell: Any) -> Any:
     """A cell for tables: the items of a list behind each other, as they show flags."""
     plain = cell.tolist() if hasattr(cell, "dtype") else cell
     return ", ".join(map(str, plain)) if isinstance(plain, list) else cell
-
-
-def _of_service(study: str, units: str | None) -> bytes:
-    """All rows of a study of the service as a Parquet file."""
-    from sprag_study.service.client import Study
-
-    with connection() as client:
-        return Study(client, study_of(client, study)).download("parquet", units)
-
-
-def _of_spec(parsed: ParsedSpec, units: str | None, db: str | None, processes: int | None) -> bytes:
-    """All rows of the study of a spec, which is run here first, as a Parquet file."""
-    from sprag_study.service.reading.quantities import SI
-    from sprag_study.service.views.library import Library
-    from sprag_study.service.views.row_files import pieces
-
-    say(*warning_lines(parsed.warnings))
-    settings = read_settings(database=db, processes=processes)
-    with run_parsed(parsed, settings, lambda _now: "", db=db, processes=processes) as done:
-        return b"".join(pieces(Library(done.store), done.record.id, "parquet", units or SI, "names", ""))
 
 
 sql = signed(

@@ -10,7 +10,7 @@ import typer
 from sprag_study.service.answers.studies import StudyOrder
 from sprag_study.service.cli import completion
 from sprag_study.service.cli.common import wants_json
-from sprag_study.service.cli.console import show_table, time_text, write_json
+from sprag_study.service.cli.console import show_table, table_words, time_text, write_json
 from sprag_study.service.cli.remote import connection
 from sprag_study.service.languages import _
 from sprag_study.worker.states import StudyState
@@ -47,14 +47,15 @@ def list_studies(
     if wants_json():
         write_json({"studies": studies})
         return
-    last = _("restorable until") if deleted else _("finish by")
-    columns = ((_("id"), False, True), (_("state"), False, True), (_("done"), True), (_("cases"), True),
-               (_("created"), False), (last, False), (_("name"), False), (_("tags"), False))  # fmt: skip
-    rows = [
-        (
-            *(s["id"], s["state"], s["progress"]["done"], s["progress"]["total"], time_text(s["created_at"])),
-            *(time_text(s["purge_at" if deleted else "finish_by"]), s["name"], ", ".join(s["tags"])),
-        )
-        for s in studies
-    ]
-    show_table("", columns, rows)
+    with table_words():
+        last = _("restorable until") if deleted else _("finish by")
+        columns = ((_("id"), False, True), (_("state"), False, True), (_("done"), True), (_("cases"), True),
+                   (_("created"), False), (last, False), (_("name"), False), (_("tags"), False))  # fmt: skip
+        rows = [
+            (
+                *(s["id"], s["state"], s["progress"]["done"], s["progress"]["total"], time_text(s["created_at"])),
+                *(time_text(s["purge_at" if deleted else "finish_by"]), s["name"], ", ".join(s["tags"])),
+            )
+            for s in studies
+        ]
+        show_table("", columns, rows)

@@ -11,7 +11,7 @@ import typer
 from sprag_study.service.cli import completion
 from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.configured import read_settings
-from sprag_study.service.cli.console import WrongInputError, agreed, say, show_table, write_json
+from sprag_study.service.cli.console import WrongInputError, agreed, say, show_table, table_words, write_json
 from sprag_study.service.cli.groups import Groups
 from sprag_study.service.cli.names import token_of, user_of
 from sprag_study.service.cli.options import Database
@@ -99,11 +99,13 @@ def list_tokens(db: Database = None) -> None:
         write_json({"database": store.session.location, "tokens": found})
         return
     fields = ("id", "name", "user", "scope", "state", "created_at", "expires_at", "used_at", "revoked_at")
-    times = (_("created"), _("expires"), _("used"), _("revoked"))
-    heads = (_("id"), _("name"), _("user"), _("scope"), _("state"), *times)
-    columns = [(head, False, place == 0) for place, head in enumerate(heads)]
-    words = {state.value: _(_STATES[state]) for state in TokenState}
-    show_table("", columns, [[words[t[field]] if field == "state" else t[field] for field in fields] for t in found])
+    with table_words():
+        times = (_("created"), _("expires"), _("used"), _("revoked"))
+        heads = (_("id"), _("name"), _("user"), _("scope"), _("state"), *times)
+        columns = [(head, False, place == 0) for place, head in enumerate(heads)]
+        words = {state.value: _(_STATES[state]) for state in TokenState}
+        rows = [[words[t[field]] if field == "state" else t[field] for field in fields] for t in found]
+        show_table("", columns, rows)
 
 
 @app.command()

@@ -17,6 +17,7 @@ from sprag_study.service.cli.console import (
     WrongInputError,
     say,
     show_table,
+    table_words,
     time_text,
     write_json,
 )
@@ -125,15 +126,16 @@ def list_users(db: Database = None) -> None:
     if wants_json():
         write_json({**where, "users": [{**_json(user), **_used(user)} for user in listed]})
         return
-    limit = _("limit")
-    waiting, size, checks = _("cases waiting"), _("bytes"), _("checks")
-    headings = (_("name"), _("role"), waiting, limit, size, limit, checks, _("removed"))
-    rows = []
-    for user in listed:
-        used = _used(user)
-        limits = used["cases"], user["most_cases"], used["bytes"], user["most_bytes"], user["most_checks"]
-        rows.append((user["name"], user["role"], *limits, time_text(_json(user)["removed_at"])))
-    show_table("", [(head, 2 <= place <= 6, place == 0) for place, head in enumerate(headings)], rows)
+    with table_words():
+        limit = _("limit")
+        waiting, size, checks = _("cases waiting"), _("bytes"), _("checks")
+        headings = (_("name"), _("role"), waiting, limit, size, limit, checks, _("removed"))
+        rows = []
+        for user in listed:
+            used = _used(user)
+            limits = used["cases"], user["most_cases"], used["bytes"], user["most_bytes"], user["most_checks"]
+            rows.append((user["name"], user["role"], *limits, time_text(_json(user)["removed_at"])))
+        show_table("", [(head, 2 <= place <= 6, place == 0) for place, head in enumerate(headings)], rows)
 
 
 @app.command()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sprag_study.service.cli.common import wants_json
-from sprag_study.service.cli.console import Column, say, show_table, time_text, write_json
+from sprag_study.service.cli.console import Column, say, show_table, table_words, time_text, write_json
 from sprag_study.service.cli.remote import connection
 from sprag_study.service.languages import _
 
@@ -20,17 +20,18 @@ def workers() -> None:
     if wants_json():
         write_json(found)
         return
-    headings = (_("workers"), _("usable"), _("busy"), _("idle threads"), _("refused"), _("cases/s"))
-    columns: list[Column] = [(_("host"), False, True), (_("processor"), False, True)]
-    columns += [(heading, True) for heading in headings]
-    fields = ("host", "processor", "workers", "usable", "busy", "idle_threads", "refused", "cases_per_second")
-    # A host with two dispatchers has a row for each: the process tells them apart.
-    columns.append((_("dispatcher"), False, True))
-    # The workers of a dispatcher that does not respond are not known.
-    known = [item for item in found["dispatchers"] if not (item["silent"] or item["ended_at"])]
-    rows = [[*(dict(host)[field] for field in fields), item["owner"]] for item in known for host in item["hosts"]]
-    if rows:
-        show_table("", columns, rows)
+    with table_words():
+        headings = (_("workers"), _("usable"), _("busy"), _("idle threads"), _("refused"), _("cases/s"))
+        columns: list[Column] = [(_("host"), False, True), (_("processor"), False, True)]
+        columns += [(heading, True) for heading in headings]
+        fields = ("host", "processor", "workers", "usable", "busy", "idle_threads", "refused", "cases_per_second")
+        # A host with two dispatchers has a row for each: the process tells them apart.
+        columns.append((_("dispatcher"), False, True))
+        # The workers of a dispatcher that does not respond are not known.
+        known = [item for item in found["dispatchers"] if not (item["silent"] or item["ended_at"])]
+        rows = [[*(dict(host)[field] for field in fields), item["owner"]] for item in known for host in item["hosts"]]
+        if rows:
+            show_table("", columns, rows)
     if not found["dispatchers"]:
         say(_("No dispatcher has worked on this database yet."))
     for item in found["dispatchers"]:

@@ -40,7 +40,7 @@ def test_a_study_from_submission_to_picture(running: Service, tmp_path: Path, sp
     curve = ("curve", study, "--x", "shaft.load", "--y", "shaft.speed.mean", "--y", "efficiency", *at)
     shown = sprag(*curve, "-o", picture)
     assert shown.code == 0
-    assert "shaft.speed.mean [rad/s]" in shown.out
+    assert "\tshaft.speed.mean\t" in shown.out
     assert len([line for line in shown.out.splitlines() if line.strip()[:1].isdigit()]) == 17
     assert "<svg" in picture.read_text()
     data = sprag(*curve, "--json").data
@@ -169,9 +169,9 @@ def test_a_worker_alone_runs_what_a_service_was_given(tmp_path: Path, sprag: Spr
     database = tmp_path / "study.sqlite3"
     assert sprag("admin", "db", "upgrade", "--db", database).code == 0
     worker = subprocess.Popen(
-        [*COMMAND, "admin", "worker", "--db", str(database), "--processes", "1"],
+        [*COMMAND, "admin", "worker", "--db", str(database)],
         stderr=subprocess.PIPE,
-        env=environment(),
+        env=environment(SPRAG_PROCESSES="1"),
     )
     assert worker.stderr is not None
     with worker, worker.stderr as said:

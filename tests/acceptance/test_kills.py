@@ -41,7 +41,7 @@ def test_a_dispatcher_that_was_stopped_commits_nothing_and_gives_up(tmp_path: Pa
 
 def test_the_service_ends_soon_with_open_streams_and_hands_running_chunks_back(tmp_path: Path) -> None:
     made = harness.spec(4_000, 2_000.0)
-    service = harness.Service(tmp_path, "--processes", 1, "--chunk", 500)
+    service = harness.Service(tmp_path, "--processes", 1, SPRAG_CHUNK_CASES="500")
     service.start()
     study = service.submit(made)
     claimed = "SELECT count(*) FROM chunks WHERE state = 'claimed'"
@@ -59,7 +59,7 @@ def test_the_service_ends_soon_with_open_streams_and_hands_running_chunks_back(t
 
 def test_a_copy_made_during_a_run_goes_on_where_it_was_made(tmp_path: Path, sprag: Callable[..., Finished]) -> None:
     made = harness.spec(120, 2_000.0)
-    with harness.running(tmp_path, "--processes", 1, "--chunk", 10) as service:
+    with harness.running(tmp_path, "--processes", 1, SPRAG_CHUNK_CASES="10") as service:
         study = service.submit(made)
         harness.until(lambda: harness.done(service.database, study) > 20, "the study goes on")
         (tmp_path / "restored").mkdir()

@@ -36,7 +36,9 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
 def here(sprag: Callable[..., Finished], folder: Path, spec: dict[str, Any]) -> list[dict[str, Any]]:
     """The rows of a study that is run as one chunk."""
     (folder / "here.json").write_text(json.dumps(spec), encoding="utf-8")
-    rows: list[dict[str, Any]] = sprag("run", folder / "here.json", "--json", "--chunk", 64).data["rows"]
+    with pytest.MonkeyPatch.context() as settings:
+        settings.setenv("SPRAG_CHUNK_CASES", "64")
+        rows: list[dict[str, Any]] = sprag("run", folder / "here.json", "--json").data["rows"]
     assert [row["case"] for row in rows] == list(range(len(rows)))
     assert {row["ending"] for row in rows} == {"ok"}
     return rows
@@ -51,7 +53,7 @@ def test_settled_cases_have_the_same_rows_in_any_cut(tmp_path: Path, sprag: Call
 
 def test_http_gives_the_same_rows_and_curves(tmp_path: Path, reference: list[dict[str, Any]]) -> None:
     with (
-        service(tmp_path, "--processes", 2, "--chunk", 7) as running,
+        service(tmp_path, "--processes", 2, SPRAG_CHUNK_CASES="7") as running,
         httpx.Client(base_url=f"{running.address}/api/v1", timeout=SECONDS) as client,
     ):
         study = f"/studies/{client.post('/studies', json=FEW).json()['id']}"

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from anyio.from_thread import BlockingPortal
 
-from sprag_study.service.cli import study_views
+from sprag_study.service.cli import remote
 from sprag_study.service.client import AsyncClient, Client, RefusedError
 from sprag_study.service.views.columns import Columns
 from tests.conftest import ROOT, Finished
@@ -109,13 +109,14 @@ def test_columns_are_read_once_until_there_are_other_rows(
     assert [whole.kinds[kind] for kind in whole.kind] == list(zip(block.endings, block.flags, strict=True))
 
 
+@pytest.mark.usefixtures("terminal")
 def test_the_command_lists_and_writes_them(
     filled: tuple[Service, str],
     sprag: Callable[..., Finished],
     connected: Callable[[ModuleType], None],
     tmp_path: Path,
 ) -> None:
-    connected(study_views)
+    connected(remote)
     service, study_id = filled
     options = ("--where", "shaft.load <= 0.3", "--sort=-efficiency", "--limit", 3)
     shown = sprag("show", study_id, "explore", *options, "-o", tmp_path / "best.csv")

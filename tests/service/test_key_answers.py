@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from anyio.from_thread import BlockingPortal
 
-from sprag_study.service.cli import study_views
+from sprag_study.service.cli import remote
 from sprag_study.service.cli.console import cell_text
 from sprag_study.service.client import AsyncClient, Client
 from sprag_study.service.http.web.sheet import chart
@@ -94,13 +94,14 @@ def test_wrong_questions_name_what_is_wrong(filled: tuple[Service, str], query: 
     assert (fault["parameter"], fault["code"]) == (parameter, code)
 
 
+@pytest.mark.usefixtures("terminal")
 def test_the_command_shows_them_and_writes_them(
     filled: tuple[Service, str],
     sprag: Callable[..., Finished],
     connected: Callable[[ModuleType], None],
     tmp_path: Path,
 ) -> None:
-    connected(study_views)
+    connected(remote)
     service, study_id = filled
     shown = sprag("show", study_id, "answers", "--point", "0.2 N*m", "-o", tmp_path / "answers.svg")
     assert shown.code == 0
@@ -114,7 +115,7 @@ def test_the_command_shows_them_and_writes_them(
     beyond = [item["value"] for curve in told["curves"] for item in curve["answers"] if item["above"]]
     assert beyond
     assert shown.out.count("> ") == len(beyond)
-    assert all(f"> {cell_text(value)}\t" in shown.out for value in beyond)
+    assert all(f"> {cell_text(value)} " in shown.out for value in beyond)
 
 
 def test_the_page_says_the_answers_first(filled: tuple[Service, str]) -> None:

@@ -84,7 +84,7 @@ def test_the_log_is_the_same_by_the_service_and_in_its_database(
     for more in ((), ("--format", "jsonl"), ("--json",), filters, ("--since", "2999-01-01"), ("--json", *filters)):
         remote, here = asked("admin", "audit", *more), sprag("admin", "audit", *more)
         assert (remote.code, remote.out) == (0, here.out), (more, remote.err)
-        assert here.out == sprag("admin", "db", "audit", *more).out
+        assert here.out == sprag("admin", "db", "audit", *more).out, "as it was called"
     file = tmp_path / "log.csv"
     assert asked("admin", "audit", "-o", file).code == 0
     assert "user.remove,dora" in file.read_text()

@@ -33,7 +33,7 @@ def test_the_example_of_the_guide(sprag: Sprag, examples: Path, tmp_path: Path) 
 
 
 def test_json(sprag: Sprag, examples: Path) -> None:
-    words = ("--case", 178, "--along", "shaft.load", "--from", "0.19 N*m", "--to", 0.23, "--format", "json")
+    words = ("--case", 178, "--along", "shaft.load", "--from", "0.19 N*m", "--to", 0.23, "--json")
     made = json.loads(sprag("show", examples / "one_pendulum.json", "branch", *words).out)
     assert (made["order"], made["value"], made["low"]) == (2, 0.2, 0.19)
     assert [special["kind"] for special in made["specials"]] == ["grazing", "doubling"]

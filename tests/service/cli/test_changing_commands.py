@@ -41,6 +41,7 @@ CHANGING = {
 #: Commands that read, and those that name their actors themselves.
 OTHERS = {
     **{f"show {name}": "as `show curves`" for name in ("front", "map", "ribbon", "sensitivity", "sql", "yield")},
+    **dict.fromkeys(("compare", "export", "show case", "show cases", "show rounds"), "as `show curves`"),
     **dict.fromkeys(("check", "show state"), "reads which rows can be reused"),
     "serve": "its requests, schedules and nightly work act by themselves",
     "admin worker": "the same without requests; cases are no changes of a person",
@@ -49,7 +50,6 @@ OTHERS = {
     "admin user list": "reads",
     "admin db check": "reads",
     "admin db backup": "writes another file",
-    "admin db audit": "reads",
     "admin audit": "reads",
     "admin db move": "writes another database, which has the log of this one",
     "admin db adopt": "changes a copy only; tests/service/schedules/test_copies.py",
@@ -126,7 +126,6 @@ def test_commands_that_read_leave_no_row(known: tuple[Store, dict[str, str]], tm
         "admin token list",
         "admin user list",
         "admin db check",
-        "admin db audit",
         "admin audit",
         f"admin db backup {backup}",
         "admin db prune --older-than 9",
@@ -173,14 +172,14 @@ def test_users_are_listed_and_wrong_ones_refused(
     ):
         failed = run(*arguments, "--json")
         assert (failed[0], json.loads(failed[2])["code"]) == (2, code), arguments
-    assert run("admin", "db", "audit", "--since", "yesterday")[0] == 2
+    assert run("admin", "audit", "--since", "yesterday")[0] == 2
     made = json.loads(run("admin", "token", "create", "--name", "x", "--user", "dora", "--expires", "1", "--json")[1])
     assert (made["user"], made["used_at"]) == ("dora", None)
     assert made["expires_at"] > made["created_at"]
-    lines = run("admin", "db", "audit", "--action", "user.add", "--format", "jsonl")[1].splitlines()
+    lines = run("admin", "audit", "--action", "user.add", "--format", "jsonl")[1].splitlines()
     assert [json.loads(line)["target"] for line in lines] == ["dora", "ada"]
-    assert run("admin", "db", "audit")[1].startswith("number,at,door,actor,")
-    document = json.loads(run("admin", "db", "audit", "--action", "user.add", "--json")[1])
+    assert run("admin", "audit")[1].startswith("number,at,door,actor,")
+    document = json.loads(run("admin", "audit", "--action", "user.add", "--json")[1])
     assert [entry["target"] for entry in document["entries"]] == ["dora", "ada"]
-    assert json.loads(run("admin", "db", "audit", "--action", "none", "--json")[1]) == {"entries": []}
-    assert run("admin", "db", "audit", "--json", "--format", "csv")[1].startswith("number,")
+    assert json.loads(run("admin", "audit", "--action", "none", "--json")[1]) == {"entries": []}
+    assert run("admin", "audit", "--json", "--format", "csv")[1].startswith("number,")

@@ -80,6 +80,7 @@ def test_a_failure_for_people_and_for_programs() -> None:
     }  # fmt: skip
 
 
+@pytest.mark.usefixtures("terminal")
 def test_data_and_messages_go_apart(capsys: pytest.CaptureFixture[str]) -> None:
     write_json({"a": "ü"})
     say("a [bold]message[/bold]", "another")
@@ -102,6 +103,7 @@ def test_a_wide_table_keeps_all_its_digits(capsys: pytest.CaptureFixture[str]) -
     assert "\N{HORIZONTAL ELLIPSIS}" not in shown
 
 
+@pytest.mark.usefixtures("terminal")
 def test_what_is_held_has_its_unit(capsys: pytest.CaptureFixture[str]) -> None:
     axis = {"path": "drive.inertia", "unit": "kg*m^2", "values": [1.0]}
     units = {"mean_speed": "rad/s", "wanted_irregularity": "1"}
@@ -111,6 +113,7 @@ def test_what_is_held_has_its_unit(capsys: pytest.CaptureFixture[str]) -> None:
     assert "mean_speed = 6.28319 rad/s, wanted_irregularity = 0.1 " in " ".join(capsys.readouterr().out.split())
 
 
+@pytest.mark.usefixtures("terminal")
 def test_curves_have_the_flags_that_regimes_do_not_say(capsys: pytest.CaptureFixture[str]) -> None:
     found = {
         "x": {"path": "shaft.load", "unit": "N*m", "values": [0.0, 1.0]},
@@ -188,7 +191,7 @@ def test_a_table_in_a_pipe_has_tabs_between_its_cells(capsys: pytest.CaptureFixt
     columns = (("shaft.\nload [N*m]", True), ("mean speed\n[rad/s]", True), ("note", False))
     show_table("Title", columns, [(0.25, None, "one\ttwo\nthree"), (12.0, 1e-9, "")])
     assert capsys.readouterr().out == (
-        "Title\nshaft.load [N*m]\tmean speed [rad/s]\tnote\n0.25\t-\tone two three\n12\t1e-09\t\n"
+        "shaft.load [N*m]\tmean speed [rad/s]\tnote\n0.25\t-\tone two three\n12.0\t1e-09\t\n"
     )
 
 

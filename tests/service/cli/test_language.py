@@ -81,7 +81,7 @@ def unmarked(text: str, names: tuple[str, ...] = ()) -> list[str]:
     before = ""
     while before != text:
         before, text = text, MARKED.sub(" ", text)
-    text = CHOICES.sub(" ", text)
+    text = CHOICES.sub(" ", re.sub("(?m)⟦[^⟦⟧\n]*$", " ", text))  # the first part of a text has no end
     for name in sorted(names, key=len, reverse=True):
         text = re.sub(rf"(?<![\w.-]){re.escape(name)}(?![\w-])", " ", text)
     return WORD.findall(NAMES.sub(" ", text))
@@ -171,7 +171,7 @@ REFUSED = (
     ["check", "x.json", "--json=1"],
     ["show", "x.json", "trajectory", "--case", "-1"],
     ["show", "x.json", "trajectory", "--case", "one"],
-    ["show", "x.json", "trajectory", "--format", "xml"],
+    ["run", "x.json", "--format", "xml"],
     ["fit", "x.csv"],
     ["admin", "user", "change", "dora"],
     ["study", "extend", "latest"],
@@ -239,7 +239,7 @@ LOCAL: dict[str, tuple[str, ...]] = {
 }
 
 
-@pytest.mark.usefixtures("pseudo", "files")
+@pytest.mark.usefixtures("pseudo", "files", "terminal")
 @pytest.mark.parametrize("line", LOCAL)
 def test_commands_say_nothing_without_a_translation(sprag: Sprag, line: str) -> None:
     if "users.sqlite3" in line:
@@ -289,7 +289,7 @@ REMOTE: dict[str, tuple[str, ...]] = {
 }
 
 
-@pytest.mark.usefixtures("pseudo", "here")
+@pytest.mark.usefixtures("pseudo", "here", "terminal")
 @pytest.mark.parametrize("line", REMOTE)
 def test_commands_for_a_service_say_nothing_without_a_translation(sprag: Sprag, service: Service, line: str) -> None:
     study = service.submit()
@@ -321,13 +321,27 @@ def test_json_is_the_same_in_every_language(sprag: Sprag, service: Service, monk
     assert [sprag(*line.split(" "), "--json") for line in lines] == english
 
 
+@pytest.mark.usefixtures("here")
+def test_tables_for_programs_are_the_same_in_every_language(
+    sprag: Sprag, service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = service.submit()
+    service.fill(study)
+    whats = ("case", "cases", "curves", "answers", "explore", "rounds")
+    lines = ["list", "presets", "models", "schedule list", *(f"show {study} {what}" for what in whats)]
+    english = [sprag(*line.split(" ")).out for line in lines]
+    assert all("\t" in out for out in english)
+    monkeypatch.setenv("SPRAG_LANGUAGE", "uk")
+    assert [sprag(*line.split(" ")).out for line in lines] == english
+
+
 @pytest.mark.usefixtures("files")
 def test_rows_are_the_same_in_every_language(sprag: Sprag, monkeypatch: pytest.MonkeyPatch) -> None:
     lines = (
         "show study.json trajectory --points 5",
         "show study.json engagements",
         "presets one_pendulum",
-        "admin db audit --db a.sqlite3",
+        "admin audit --db a.sqlite3",
     )
     sprag("admin", "db", "upgrade", "--db", "a.sqlite3")
     english = [sprag(*line.split(" ")).out for line in lines]

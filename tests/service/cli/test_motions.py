@@ -16,6 +16,7 @@ Sprag = Callable[..., Finished]
 SPEED = "shaft.initial_speed"
 
 
+@pytest.mark.usefixtures("terminal")
 def test_the_example_of_the_guide(sprag: Sprag, examples: Path) -> None:
     guide = (examples.parent / "docs" / "starts.md").read_text(encoding="utf-8")
     command = next(line for line in guide.splitlines() if line.startswith("    sprag show "))

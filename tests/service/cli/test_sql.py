@@ -10,7 +10,7 @@ from types import ModuleType
 
 import pytest
 
-from sprag_study.service.cli import sql
+from sprag_study.service.cli import remote
 from sprag_study.worker.models import run_chunk
 from tests.conftest import Finished
 from tests.service import conftest
@@ -27,7 +27,7 @@ def sources(
 ) -> tuple[str, str]:
     """A study as a file, and the same study of a service."""
     monkeypatch.setattr(conftest, "made_up", lambda study: run_chunk(study, 0, study.cases))
-    connected(sql)
+    connected(remote)
     file = tmp_path / "study.json"
     file.write_text(json.dumps(_SMALL))
     study_id = service.submit(_SMALL)

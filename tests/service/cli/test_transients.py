@@ -35,7 +35,7 @@ def test_the_example_of_the_guide(sprag: Sprag, examples: Path, tmp_path: Path) 
 
 def test_json_and_the_exit_code_of_a_stall(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
     """Case 27 cuts with 40 kN, which stalls the motor wherever the shaft starts."""
-    done = sprag("show", examples / "slotter.toml", "transient", "--case", 27, "--kind", "run-up", "--format", "json")
+    done = sprag("show", examples / "slotter.toml", "transient", "--case", 27, "--kind", "run-up", "--json")
     made = json.loads(done.out)
     assert done.code == 4
     assert (made["outcome"], made["ending"], made["results"]["time"]) == ("stopped", "motor_stalled", None)
@@ -85,7 +85,7 @@ def test_a_row_for_each_case_of_a_study(sprag: Sprag, tmp_path: Path) -> None:
     rows = list(csv.DictReader(done.out.splitlines()))
     assert [float(row["drive.inertia"]) for row in rows] == [2.0, 4.0, 8.0]
     assert [float(row["time"]) for row in rows] == pytest.approx([1.0, 2.0, 4.0], rel=1e-12)
-    lines = [json.loads(line) for line in sprag(*words, "--format", "json").out.splitlines()]
+    lines = [json.loads(line) for line in sprag(*words, "--json").out.splitlines()]
     assert [line["time"] for line in lines] == [float(row["time"]) for row in rows]
     stalled = sprag("show", spec, "transient", "--kind", "run-up", "--torque", "2 N*m", "--all")
     assert stalled.code == 4

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import json
+import math
 import re
 from typing import TYPE_CHECKING, Any
 
@@ -10,9 +12,10 @@ import pytest
 import typer
 
 from sprag_study.service import languages
-from sprag_study.service.cli import case_views, remote, study_views
+from sprag_study.service.cli import case_views, remote
 from sprag_study.service.cli import sources as of_commands
 from sprag_study.service.cli.app import command_line
+from sprag_study.service.cli.console import cell_text
 from sprag_study.service.exports.decimal_commas import with_commas
 from sprag_study.service.views.answers import AnswersView
 from sprag_study.service.views.case_questions import CASE_VIEWS
@@ -40,7 +43,7 @@ def sources(
 ) -> tuple[Path, str]:
     """The same study as a file, and run by a service."""
     monkeypatch.setattr(conftest, "made_up", lambda study: run_chunk(study, 0, study.cases))
-    connected(study_views)
+    connected(remote)
     connected(case_views)
     file = tmp_path / "study.json"
     file.write_text(json.dumps(_SMALL))
@@ -155,7 +158,7 @@ def test_wrong_settings_name_their_options(
     def run(*_: object, **__: object) -> None:
         raise AssertionError("the study is run before what is wrong is told")
 
-    monkeypatch.setattr(study_views, "run_parsed", run)
+    monkeypatch.setattr(remote, "run_parsed", run)
     done = sprag("show", sources[0], "front")
     assert (done.code, "(the whole spec): the study has no goal" in done.err) == (2, True)
     for arguments, named in (
@@ -166,15 +169,67 @@ def test_wrong_settings_name_their_options(
         (("sensitivity", "--y", "nonsense"), "--y"), (("ribbon", "--y", "nonsense"), "--y"),
         (("yield", "nonsense > 3"), "--condition"), (("curves", "-o", "a.svg", "--language", "xx"), "--language"),
         (("curves", "-o", "a.csv", "--units", "bogus"), "--units"),
-        (("curves", "--units", "rpm"), "--units: only a file has them"),
-        (("curves", "-o", "a.csv", "--language", "uk"), "--language: only pictures have it"),
+        (("curves", "--units", "rpm", "--json"), "JSON is in SI units"),
+        (("curves", "--units", "bogus"), "--units"),
         (("curves", "--y", "speed"), "did you mean 'shaft.speed.mean'?"),
     ):  # fmt: skip
         done = sprag("show", sources[0], *arguments)
         assert (done.code, named in done.err) == (2, True), (arguments, done.err)
     monkeypatch.setattr("sprag_study.service.views.case_view.see", run)
     done = sprag("show", sources[0], "strobes", "-o", "a.svg", "--language", "xx")
-    assert (done.code, "--language: unknown language" in done.err) == (2, True), done.err
+    assert (done.code, "--language: is not a language" in done.err) == (2, True), done.err
+
+
+def test_cases_and_rows_of_a_spec_are_those_of_a_study(
+    sprag: Callable[..., Finished], sources: tuple[Path, str], tmp_path: Path
+) -> None:
+    kept = tmp_path / "kept.sqlite3"
+    assert sprag("run", sources[0], "--db", kept, "-o", tmp_path / "rows.csv").code == 0
+    for line in (
+        ("show", "cases", "--result", "efficiency"), ("show", "cases", "--units", "rpm, N*mm"),
+        ("show", "case", "--case", 2), ("show", "case", "--units", "rpm"), ("show", "rounds"),
+        ("export", "--units", "rpm"), ("show", "cases", "--where", "shaft.load >= 9"),
+    ):  # fmt: skip
+        word, *more = line
+        here, there = sprag(word, sources[0], *more, "--db", kept), sprag(word, sources[1], *more)
+        assert (here.code, there.code) == (0, 0), (line, here.err, there.err)
+        assert here.out == there.out, line
+    done = sprag("compare", *sources, "--json")
+    assert done.code == 0, done.err
+    here_curves, there_curves = (found["curves"] for found in done.data["curves"].values())
+    assert here_curves == there_curves
+    refused = sprag("compare", sources[1], sources[1], "--db", kept)
+    assert (refused.code, "--db: belongs to a spec" in refused.err) == (2, True)
+
+
+def test_programs_get_the_table_of_the_file(
+    sprag: Callable[..., Finished], sources: tuple[Path, str], tmp_path: Path
+) -> None:
+    file = tmp_path / "file.csv"
+    asked = ("curves --units rpm", "answers", "explore --limit 2", "sensitivity --y efficiency")
+    for name, *options in map(str.split, asked):
+        for source in sources:
+            done = sprag("show", source, name, *options, "-o", file)
+            rows = list(csv.reader(file.read_text("utf-8").splitlines()))
+            shown = [line.split("\t") for line in done.out.splitlines()]
+            assert (done.code, shown) == (0, rows[: len(shown)]), (name, done.err)
+
+
+@pytest.mark.usefixtures("terminal")
+def test_people_get_tables_in_their_units(sprag: Callable[..., Finished], sources: tuple[Path, str]) -> None:
+    (curve,) = sprag("show", sources[1], "curves", "--y", "shaft.speed.mean", "--json").data["curves"]
+    rpm = [cell_text(speed * 30 / math.pi) for speed in curve["y"]["shaft.speed.mean"]]
+    for source in sources:
+        table = sprag("show", source, "curves", "--y", "shaft.speed.mean", "--units", "rpm, N*mm").out
+        assert {"shaft.speed.mean [rpm]", "shaft.load [N*mm]"} <= {*re.split(r" {2,}", table)}
+        assert [
+            line.split()[:2] for line in table.splitlines() if "ok" not in line and line.split()[:1] == ["100"]
+        ] == [["100", rpm[1]]]
+        assert f" {rpm[1]} " in sprag("show", source, "cases", "--result", "shaft.speed.mean", "--units", "rpm").out
+        shown = sprag("show", source, "answers", "--point", "100 N*mm", "--units", "rpm, N*mm").out
+        assert f" {rpm[1]} " in shown
+        assert "shaft.load [N*mm]" in shown
+    assert sprag("show", sources[1], "curves", "--units", "bogus").err.count("--units: ") == 1
 
 
 def test_what_is_written_is_said_here_and_by_a_service(

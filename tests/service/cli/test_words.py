@@ -19,7 +19,7 @@ import typer
 from sprag_study.service.cli import common, components, doctor
 from sprag_study.service.cli.app import command_line
 from sprag_study.service.cli.groups import common_first
-from sprag_study.service.cli.old_words import OLD, forwarded
+from sprag_study.service.cli.old_words import OLD, forwarded, without_gone
 from sprag_study.service.client import Client
 from sprag_study.service.login import DEFAULT_SERVER
 from sprag_study.service.login import profile_file as login_file
@@ -83,6 +83,32 @@ def test_old_names_keep_their_arguments() -> None:
         "show", "trajectory", "st_1", "--case", "4", "--from=6 periods", "-o", "a.csv",
     ]  # fmt: skip
     assert forwarded(["list", "curve"]) == (["list", "curve"], "")
+    for old in (["admin", "db", "audit"], ["db", "audit"]):
+        assert forwarded([*old, "--json"]) == (["admin", "audit", "--json"], "admin audit")
+
+
+def test_options_that_are_gone_are_forwarded_with_a_line(
+    sprag: Sprag, examples: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("SPRAG_PROCESSES", raising=False)
+    for count, code in (("3", 0), ("0.5", 2)):
+        done = sprag("check", examples / "one_pendulum.json", "--processes", count)
+        assert (done.code, "`--processes` is `SPRAG_PROCESSES` from now on\n" in done.err) == (code, True)
+    assert "SPRAG_PROCESSES" not in os.environ
+    assert without_gone(["admin", "worker", "--processes", "2"])[1] == {"SPRAG_PROCESSES": "2"}
+    assert without_gone(["show", "a", "strobes", "--format=json"]) == (
+        ["show", "a", "strobes", "--json"], {}, [("--format", "--json")],
+    )  # fmt: skip
+    assert without_gone(["export", "a", "--format", "csv"]) == (["export", "a", "--format", "csv"], {}, [])
+
+
+def test_a_misspelt_view_is_named_with_those_that_the_study_has(sprag: Sprag, examples: Path) -> None:
+    done = sprag("show", examples / "one_pendulum.json", "crves")
+    assert done.code == 2
+    assert "WHAT: is no view; did you mean 'curves'? (got 'crves'; allowed: state, answers, curves" in done.err
+    assert "transient" not in done.err
+    assert "calibration" not in done.err
+    assert "transient" in sprag("show", examples / "press.toml", "curvs").err
 
 
 @pytest.mark.parametrize(
@@ -109,15 +135,15 @@ def test_common_options_stand_anywhere() -> None:
         "x",
     ]
     assert common_first(line) == (
-        ["--language", "uk", "--json", "--server=http://a", "--token", "x"],
-        ["show", "st_1", "curves", "--language", "de"],
+        ["--language", "uk", "--json", "--language", "de", "--server=http://a", "--token", "x"],
+        ["show", "st_1", "curves"],
     )
     assert common_first(["list", "--", "--json"]) == ([], ["list", "--", "--json"])
 
 
 @pytest.mark.parametrize("option", ["--token", "--server", "--language"])
 def test_a_common_option_without_its_value_is_refused(sprag: Sprag, option: str) -> None:
-    for line in (("list", option), (option,)) if option != "--language" else ((option,),):
+    for line in (("list", option), (option,)):
         done = sprag(*line)
         assert (done.code, f"Option '{option}' requires an argument." in done.err) == (2, True), done.err
 

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from anyio.from_thread import BlockingPortal
 
-from sprag_study.here import Here
 from sprag_study.service.client import Client, Study
+from sprag_study.service.here import Here
 from sprag_study.service.settings import Settings
 from sprag_study.service.storage.studies.records import StudyRecord
 from tests.service.conftest import PortalTransport, Service

@@ -13,7 +13,7 @@ import httpx
 import pytest
 from anyio.from_thread import BlockingPortal
 
-from sprag_study.service.cli import study_views
+from sprag_study.service.cli import remote
 from sprag_study.service.client import AsyncClient, Client
 from tests.conftest import Finished
 from tests.service.calibrating import calibration, spec_of
@@ -26,6 +26,7 @@ async def asynchronous(service: Service, study_id: str) -> Any:
         return await (await client.study(study_id)).calibration()
 
 
+@pytest.mark.usefixtures("terminal")
 def test_both_clients_and_the_command_give_a_calibration(
     service: Service,
     portal: BlockingPortal,
@@ -39,7 +40,7 @@ def test_both_clients_and_the_command_give_a_calibration(
         assert client.study(study_id).calibration() == found
     assert portal.call(partial(asynchronous, service, study_id)) == found
 
-    connected(study_views)
+    connected(remote)
     shown = sprag("show", study_id, "calibration", "-o", tmp_path / "points.csv")
     assert shown.code == 0
     for sentence in found["sentences"]:

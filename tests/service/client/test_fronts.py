@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import json
+import re
+import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -11,9 +13,10 @@ from types import ModuleType
 from typing import Any
 
 import httpx
+import pytest
 from anyio.from_thread import BlockingPortal
 
-from sprag_study.service.cli import study_views
+from sprag_study.service.cli import remote
 from sprag_study.service.client import AsyncClient, Client
 from tests.conftest import Finished
 from tests.service.conftest import PortalTransport, Service
@@ -42,18 +45,24 @@ def test_the_command_shows_the_best_designs(
     sprag: Callable[..., Finished],
     connected: Callable[[ModuleType], None],
     tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    connected(study_views)
+    connected(remote)
     study_id = search(service)
     found = service.get(f"/studies/{study_id}/front")
     shown = sprag("show", study_id, "front", "--limit", 3, "-o", tmp_path / "front.csv")
     assert shown.code == 0
     counts, designs = found["counts"], found["designs"]
-    lines = shown.out.splitlines()
-    assert lines[0].startswith(f"{counts['known']} designs, {counts['feasible']} feasible")
-    assert {"excitation.amplitude_x", "[rad/s]"} <= set(shown.out.split())
-    rows = [line.split("\t") for line in lines[2:]]
-    assert [[int(row[0]), int(row[-2])] for row in rows] == [[item["design"], item["rank"]] for item in designs[:3]]
+    rows = list(csv.DictReader(shown.out.splitlines(), delimiter="\t"))
+    ranks = [[item["design"], item["rank"]] for item in designs[:3]]
+    assert [[int(row["design"]), int(row["rank"])] for row in rows] == ranks
+    with monkeypatch.context() as people:
+        people.setattr(sys.stdout, "isatty", lambda: True)
+        for name, value in {"TERM": "dumb", "COLUMNS": "500", "LINES": "100"}.items():
+            people.setenv(name, value)
+        table = sprag("show", study_id, "front", "--limit", 3).out
+    assert table.strip().startswith(f"{counts['known']} designs, {counts['feasible']} feasible")
+    assert {"amplitude_x", "[rad/s]"} <= {*re.split(r"[\s.]+", table)}
     with (tmp_path / "front.csv").open(newline="") as file:
         assert len(list(csv.DictReader(file))) == counts["known"]
     told = json.loads(sprag("show", study_id, "front", "--exact", "--json").out)

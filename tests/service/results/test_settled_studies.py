@@ -87,10 +87,11 @@ def test_a_grid_of_curves_has_regime_and_order_of_every_point(
         curves.to_xarray()
 
 
+@pytest.mark.usefixtures("terminal")
 def test_the_command_shows_the_regime_of_every_point_of_a_curve(
     service: Service, study_id: str, linked: Linked, sprag: Any
 ) -> None:
-    linked("study_views")
+    linked("remote")
     done = sprag("show", study_id, "curves", "--x", "shaft.load", "--y", "shaft.speed.mean")
     assert done.code == 0, done.err
     lines = [line.split() for line in done.out.splitlines()]
@@ -209,7 +210,7 @@ def test_clients_and_command_list_cases_by_ending_regime_and_flag(
         async with AsyncClient("http://localhost", transport=httpx.ASGITransport(service.app)) as client:
             return [case async for case in (await client.study(study_id)).cases(**kind)]
 
-    linked("cases")
+    linked("remote")
     with Client("http://localhost", transport=PortalTransport(service.app, portal)) as client:
         for kind, numbers in kinds:
             found = list(client.study(study_id).cases(**kind))

@@ -183,6 +183,6 @@ def test_the_command_shows_them_on_the_clock_of_the_schedule(
     code, out, _ = run("night", "--hours", "744", "--stages")
     assert code == 4  # no case ended ok
     (line,) = (line.split("\t") for line in out.splitlines() if "Computing" in line)
-    day = "2026-01-01 {} +01:00".format
-    assert line == [name, study, "Computing", day("02:10:00"), day("02:39:58"), "29 min 58 s"]
+    day = "2026-01-01T{}+01:00".format
+    assert line == [name, study, "Computing", day("02:10:00"), day("02:39:58"), "1798.0"]
     assert "Computing" not in run("night", "--hours", "744")[1]

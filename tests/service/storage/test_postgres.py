@@ -372,8 +372,9 @@ def test_commands_about_the_database(
 
 
 def worker(url: str) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "sprag_study.service.cli", "worker", "--db", url, "--processes", "1"]
-    return subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True)
+    command = [sys.executable, "-m", "sprag_study.service.cli", "worker", "--db", url]
+    environment = {**os.environ, "SPRAG_PROCESSES": "1"}
+    return subprocess.Popen(command, cwd=ROOT, env=environment, stderr=subprocess.PIPE, text=True)
 
 
 def test_workers_share_studies_and_take_over_those_of_one_that_is_killed_or_loses_its_connection(

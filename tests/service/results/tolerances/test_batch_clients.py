@@ -14,7 +14,7 @@ import httpx
 import pytest
 from anyio.from_thread import BlockingPortal
 
-from sprag_study.service.cli import study_views
+from sprag_study.service.cli import remote
 from sprag_study.service.client import AsyncClient, Client
 from tests.conftest import Finished
 from tests.service.conftest import PortalTransport, Service
@@ -52,13 +52,14 @@ def test_both_clients_give_tables(service: Service, portal: BlockingPortal) -> N
     assert both == (service.get(f"{own}/ribbon", x="load", y="speed"), found.data)
 
 
+@pytest.mark.usefixtures("terminal")
 def test_the_commands_show_and_write_them(
     service: Service,
     sprag: Callable[..., Finished],
     connected: Callable[[ModuleType], None],
     tmp_path: Path,
 ) -> None:
-    connected(study_views)
+    connected(remote)
     study_id = finish(service, {**SPEC, "drives": 128})
     own = f"/studies/{study_id}"
     file = tmp_path / "ribbon.csv"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from abc import ABC, abstractmethod
 from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final, TypeVar
@@ -41,7 +40,8 @@ from sprag_study.service.views.library import Library
 from sprag_study.service.views.queries import asked
 from sprag_study.service.views.studies import STUDY_VIEWS
 from sprag_study.service.views.study_questions import CasesQuestion, ReportQuestion, SelectQuestion
-from sprag_study.service.views.study_view import study_file
+from sprag_study.service.views.study_view import StudyAnswer, StudyView, answer_of, is_drawn
+from sprag_study.service.views.study_view import written as written_view
 from sprag_study.worker.limits import (
     MAX_NARROW_STEPS,
     MAX_SETTLED_PERIODS,
@@ -68,7 +68,7 @@ _CASE: Final = re.compile(r"/cases/(\d+)(?:/(\w+))?")
 _ROWS: Final = tuple(dict.fromkeys(("json", *FORMATS)))
 
 
-class Here(Connection, ABC):
+class Here(Connection):
     """The studies of a database, as a connection to a service has them.
 
     Parameters
@@ -82,13 +82,15 @@ class Here(Connection, ABC):
         self.server, self.retry, self._answered = "this process", 0.0, True
         self.library = Library(store)
         self._settings = settings
+        #: The latest view of a study: a table and a file of it are often asked for one after the other.
+        self._latest: tuple[tuple[object, ...], StudyAnswer[Any, Any]] | None = None
 
     def require_open(self) -> None:
         """Raise StoreError where the database is closed."""
 
-    @abstractmethod
     def run(self, record: StudyRecord) -> StudyRecord:
-        """Run a study of the database to its end."""
+        """Run a study of the database to its end; only where further studies are asked for."""
+        raise NotImplementedError
 
     def request(self, method: str, path: str, **arguments: Any) -> dict[str, Any]:
         """The JSON object that a service answers; RefusedError."""
@@ -178,8 +180,15 @@ class Here(Connection, ABC):
                 return [self._case(study_id, study, int(of_case[1]), of_case[2], form, query)]
             view = _known(STUDY_VIEWS, part[1:])
             choice_of("format", form, ("json", "csv", *PICTURES))
-            chosen, title = view.choose(study, asked(view.about.question, query)), study.name or study.model
-            return [study_file(library, study_id, view, chosen, choice, title, form)]
+            answer = self._found(study_id, view, view.choose(study, asked(view.about.question, query)), form)
+            return [written_view(view, answer, choice, study.name or study.model, form)]
+
+    def _found(self, study_id: str, view: StudyView[Any, Any, Any], chosen: Any, form: str) -> StudyAnswer[Any, Any]:
+        revision, is_picture = self.library.store.studies.get(study_id).revision, view.drawn_differs and is_drawn(form)
+        asked_for = (study_id, revision, view.about.name, chosen, is_picture)
+        if self._latest is None or self._latest[0] != asked_for:
+            self._latest = asked_for, answer_of(self.library, study_id, view, chosen, drawn=is_picture)
+        return self._latest[1]
 
     def _case(self, study_id: str, study: Study, case: int, name: str | None, form: Any, query: Query) -> bytes:
         if case >= study.cases:
