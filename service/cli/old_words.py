@@ -17,12 +17,14 @@ _VIEWS: Final = (
 #: What settings of a case are called as options, where this is not their name.
 _OPTIONS: Final = {("diagram", "points"): "values", ("basin", "points"): "grid"}
 #: Options that commands had, and what says the same.
-_GONE: Final = {
+GONE: Final = {
     ("show", "--processes"): "SPRAG_PROCESSES",
     ("check", "--processes"): "SPRAG_PROCESSES",
     ("show", "--format"): "--json",
     ("run", "--chunk"): "SPRAG_CHUNK_CASES",
     ("serve", "--chunk"): "SPRAG_CHUNK_CASES",
+    ("serve", "--tls-certificate"): "SPRAG_TLS_CERTIFICATE",
+    ("serve", "--tls-key"): "SPRAG_TLS_KEY",
     ("admin worker", "--processes"): "SPRAG_PROCESSES",
 }
 #: The new name by the old one; ID is the argument, which stands behind both.
@@ -83,7 +85,7 @@ def without_gone(words: Sequence[str]) -> tuple[list[str], dict[str, str], list[
     rest = iter(words)
     for word in rest:
         option, equals, value = word.partition("=")
-        instead = next((_GONE[name, option] for name in names if (name, option) in _GONE), None)
+        instead = next((GONE[name, option] for name in names if (name, option) in GONE), None)
         if instead is None:
             kept.append(word)
             continue

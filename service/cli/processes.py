@@ -18,13 +18,6 @@ from sprag_study.service.cli.stores import database_of
 Host = Annotated[
     str | None, typer.Option("--host", metavar="ADDRESS", help="Address to listen on; default: this machine only.")
 ]
-TlsCertificate = Annotated[
-    str | None,
-    typer.Option("--tls-certificate", metavar="FILE", help="PEM file with the certificate: https without a proxy."),
-]
-TlsKey = Annotated[
-    str | None, typer.Option("--tls-key", metavar="FILE", help="PEM file with its key; default: in the same file.")
-]
 Port = Annotated[int | None, typer.Option(min=0, max=65535, help="Port to listen on; 0: any free one.")]
 
 
@@ -33,8 +26,6 @@ def serve(
     port: Port = None,
     db: Database = None,
     processes: Processes = None,
-    tls_certificate: TlsCertificate = None,
-    tls_key: TlsKey = None,
 ) -> None:
     """Start the service and its worker; Ctrl-C ends both. With --json the address is printed on standard output."""
     # What is imported stays: looking for garbage among it would take a fifth of the time of the start.
@@ -51,8 +42,6 @@ def serve(
         port=port,
         database=db,
         processes=processes,
-        tls_certificate=tls_certificate,
-        tls_key=tls_key,
     )
 
     def announce(address: str) -> None:

@@ -48,7 +48,7 @@ def test_a_service_with_a_certificate_speaks_https_only(tmp_path: Path) -> None:
     file, key = make(tmp_path)
     trust = ssl.create_default_context(cafile=str(file))
     settings = {"SPRAG_TOKEN": TOKEN, "SPRAG_PROCESSES": "1"}
-    with service(tmp_path, "--tls-certificate", file, "--tls-key", key, **settings) as started:
+    with service(tmp_path, SPRAG_TLS_CERTIFICATE=str(file), SPRAG_TLS_KEY=str(key), **settings) as started:
         assert started.address.startswith("https://127.0.0.1:")
         with httpx.Client(base_url=started.address, verify=trust, timeout=600, trust_env=False) as client:
             assert client.get("/livez").json() == {"status": "ok"}
