@@ -50,9 +50,6 @@ _SPRING: Final = {
     "force.min": (Phrase("Smallest force"), "N"), "force.max": (Phrase("Largest force"), "N"),
     "moment.min": (Phrase("Smallest moment"), "N*m"), "moment.max": (Phrase("Largest moment"), "N*m"),
 }  # fmt: skip
-_HEADINGS: Final = (
-    (Phrase("Part"), "1"), (Phrase("Direction"), "1"), *((text, "N") for text in _STATISTICS.values()),
-)  # fmt: skip
 
 ForcesAnswer = CaseAnswer[tuple[Bearing, int, str], Forces]
 
