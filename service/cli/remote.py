@@ -178,26 +178,36 @@ def opened(
 
 
 @contextmanager
-def read_in(source: Connection, study_id: str, units: str | None) -> Iterator[Reading]:
-    """How a study of `opened` is read on a terminal; tables within the block have its units.
+def read_in(source: Connection, study_id: str, units: str | None) -> Iterator[Callable[[], Reading]]:
+    """What gives the reading of a study of `opened` on a terminal; tables within the block have its ``units``.
 
-    Raises WrongInputError for units that it has not.
+    Without them nothing is loaded that knows the models. Raises WrongInputError for units that it has not.
     """
     from sprag_study.service.client.wire import study_path
-    from sprag_study.service.reading.reader import Choice, Reading, reading_for  # knows the models
+
+    def detail() -> dict[str, Any]:
+        return source.request("GET", study_path(study_id))
+
+    if units is None:
+
+        def plain() -> Reading:
+            from sprag_study.service.reading.reader import Reading
+
+            return Reading(detail()["model"])
+
+        yield plain
+        return
+    from sprag_study.service.reading.reader import Choice, reading_for
     from sprag_study.service.spec.document import parse_spec
 
-    detail = source.request("GET", study_path(study_id))
-    reading = Reading(detail["model"])
-    if units is not None:
-        parsed = parse_spec(detail["spec"])
-        try:
-            reading = reading_for(parsed.study, parsed.spec, Choice(units))
-        except FaultError as error:
-            faults = [replace(fault, where="--units") for fault in error.faults]
-            raise WrongInputError("invalid-parameter", _("invalid option"), faults) from error
+    parsed = parse_spec(detail()["spec"])
+    try:
+        reading = reading_for(parsed.study, parsed.spec, Choice(units))
+    except FaultError as error:
+        faults = [replace(fault, where="--units") for fault in error.faults]
+        raise WrongInputError("invalid-parameter", _("invalid option"), faults) from error
     with tables_in(reading.units):
-        yield reading
+        yield lambda: reading
 
 
 def submit(
@@ -256,15 +266,15 @@ def study_named(text: str, points: str | None, tables: list[str] | None) -> Pars
 
 
 def views_of(text: str, names: Iterable[str]) -> list[str]:
-    """Those of the views by these names that a study has; all where it cannot be asked."""
-    from sprag_study.service.views.cases import CASE_VIEWS
-    from sprag_study.service.views.studies import STUDY_VIEWS
-
-    views: dict[str, Any] = {**STUDY_VIEWS, **CASE_VIEWS}
+    """Those of the views by these names that a study has; all where it cannot be asked, or the models are missing."""
     try:
+        from sprag_study.service.views.cases import CASE_VIEWS
+        from sprag_study.service.views.studies import STUDY_VIEWS
+
         study = study_named(text, None, None).study
-    except CommandFailureError:
+    except (CommandFailureError, ModuleNotFoundError):
         return [*names]
+    views: dict[str, Any] = {**STUDY_VIEWS, **CASE_VIEWS}
     return [name for name in names if name not in views or views[name].has(study)]
 
 

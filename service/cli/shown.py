@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
@@ -255,8 +255,9 @@ def _share(share: float | None) -> str:
     return "" if share is None else f"{cell_text(round(100.0 * share, 1))} %"
 
 
-def show_answers(found: dict[str, Any], reading: Reading) -> None:
+def show_answers(found: dict[str, Any], reading_of: Callable[[], Reading]) -> None:
     """A table for each curve: its answers and its working point; then the extremes among all cases."""
+    reading = reading_of()
     x = heading(found["x"] or "", found["unit"] or "1")
     columns: list[Column] = [
         (_("answer"), False, True),

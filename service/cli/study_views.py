@@ -59,13 +59,13 @@ _Measured = Annotated[
 class Command:
     """The command of a view: its name, how it shows the answer, and what differs from the settings of the view.
 
-    ``show`` gets the answer, and how it is read. ``few`` are the rows of a table, unless others are asked for; a file
-    has as many as the question allows. Programs get the rows of the file, unless ``in_rows`` is false.
+    ``show`` gets the answer, and what gives its reading. ``few`` are the rows of a table, unless others are asked for;
+    a file has as many as the question allows. Programs get the rows of the file, unless ``in_rows`` is false.
     """
 
     name: str
     about: ViewInfo
-    show: Callable[[dict[str, Any], Reading], None]
+    show: Callable[[dict[str, Any], Callable[[], Reading]], None]
     few: int | None = None
     in_rows: bool = True
 

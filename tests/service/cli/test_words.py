@@ -302,3 +302,16 @@ def test_a_damaged_login_is_none(login: Path, monkeypatch: pytest.MonkeyPatch) -
     login.parent.mkdir(parents=True)
     login.write_text("not JSON")
     assert common.access()[:2] == (DEFAULT_SERVER, None)
+
+
+def test_a_view_of_a_service_is_asked_for_without_the_models() -> None:
+    code = (
+        "import sys; sys.stdout.isatty = lambda: True\n"
+        "from sprag_study.service.cli.app import execute\n"
+        "from sprag_study.service.cli.remote import read_in\n"
+        "with read_in(None, 'st_1', None): pass\n"
+        "assert execute(['show', 'st_1', 'curves', '--server', 'http://127.0.0.1:1']) == 3\n"
+        "print([name for name in ('numba', 'scipy', 'sqlalchemy', 'sprag_study.engine') if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n", done.stderr
