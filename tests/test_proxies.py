@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from sprag_study.service.http import attempts
 from sprag_study.service.http.roles import ROLES
 from sprag_study.service.settings import Settings
 from sprag_study.worker import limits
@@ -14,6 +15,8 @@ from sprag_study.worker import limits
 ROOT = Path(__file__).resolve().parents[1]
 NGINX, CADDY = ((ROOT / "examples" / name).read_text("utf-8") for name in ("nginx.conf", "Caddyfile"))
 PAGE = (ROOT / "docs" / "proxy.md").read_text("utf-8")
+#: The locations of nginx for a service with a prefix.
+PREFIXED = next(text for text in re.findall(r"```nginx\n(.*?)```", PAGE, re.DOTALL) if "location = /sprag" in text)
 UNITS = {"s": 1, "m": 60, "h": 3_600, "k": 2**10, "KiB": 2**10, "MiB": 2**20}
 
 
@@ -55,16 +58,37 @@ def test_both_lead_to_the_service_and_do_not_compress() -> None:
     assert values(CADDY, "encode") == []
 
 
+def test_a_prefix_stays_in_the_path() -> None:
+    """The service answers with it; a path behind the address of `proxy_pass` would replace it."""
+    assert set(values(PREFIXED, "proxy_pass")) == {"http://127.0.0.1:8000"}
+    assert values(PREFIXED, "location") != []
+    assert "reverse_proxy /sprag/* 127.0.0.1:8000 {" in PAGE
+    assert "handle_path" not in PAGE + CADDY
+    for text in (NGINX, CADDY):
+        assert "SPRAG_URL_PREFIX=/sprag" in text
+        assert "SPRAG_PUBLIC_URL=https://sprag.example/sprag" in text
+
+
+def test_an_office_behind_one_address_can_be_left_out_of_the_limits() -> None:
+    """nginx counts no request whose key is empty."""
+    assert {zone.split()[0] for name in ("limit_req_zone", "limit_conn_zone") for zone in values(NGINX, name)} == {
+        "$sprag_address"
+    }
+    assert 'map $sprag_limited $sprag_address {\n    0 "";\n    1 $binary_remote_addr;' in NGINX
+    assert (attempts.MOST_WAITING, attempts.LONGEST_SECONDS) == (4, 4.0), "docs/proxy.md says so"
+
+
 def test_nginx_speaks_http_2_as_caddy_does_by_itself() -> None:
     assert values(NGINX, "http2") == ["on"]
 
 
-def test_nginx_passes_streams_on_as_they_come() -> None:
-    (location,) = re.findall(r"location ~ (\S+) \{[^}]*proxy_buffering off;", NGINX)
-    study = "/api/v1/studies/st_0123456789abcdef"
-    for path in (f"{study}/events", "/live/nights", "/live/study"):
+@pytest.mark.parametrize(("text", "prefix"), [(NGINX, ""), (NGINX, "/sprag"), (PREFIXED, "/sprag")])
+def test_nginx_passes_streams_on_as_they_come(text: str, prefix: str) -> None:
+    (location,) = re.findall(r"location ~ (\S+) \{[^}]*proxy_buffering off;", text)
+    study = f"{prefix}/api/v1/studies/st_0123456789abcdef"
+    for path in (f"{study}/events", f"{prefix}/live/nights", f"{prefix}/live/study"):
         assert re.search(location, path), path
-    for path in ("/", study, f"{study}/results", "/nights", "/static/live.js"):
+    for path in ("/", study, f"{study}/results", f"{prefix}/nights", f"{prefix}/static/live.js"):
         assert not re.search(location, path), path
     assert "GET /live/{name}" in ROLES
     assert "GET /api/v1/studies/{study_id}/events" in ROLES

@@ -66,7 +66,7 @@ def test_the_image_has_the_program_and_nothing_of_its_sources(image: Image) -> N
     assert where.startswith(f"{image.root}/opt/sprag/lib/")
     wheel, installation = (rest for name, rest in steps(RECIPE) if name == "RUN" and "pip" in rest)
     assert "pip wheel" in wheel
-    assert '--constraint constraints.txt "$(ls /build/dist/*.whl)[postgres,cluster]"' in installation
+    assert '--constraint constraints.txt "$(ls /build/dist/*.whl)[postgres,cluster,oidc,traces]"' in installation
     stages = [rest for name, rest in steps(RECIPE) if name == "FROM"]
     assert [stage.partition(" AS ")[2] for stage in stages] == ["wheel", "build", ""]
     assert {name: image.environment[name] for name in ("SPRAG_DATABASE", "SPRAG_KERNEL_CACHE")} == {
