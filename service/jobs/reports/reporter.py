@@ -76,7 +76,7 @@ class Reporter(PollingThread):
         # Two to the power of twenty minutes is longer than any report is kept.
         pause = min(FIRST_PAUSE * 2 ** min(report.attempts - 1, 20), LONGEST_PAUSE)
         again = None if error.permanent or now + pause - report.created_at > GIVEN_UP_AFTER else now + pause
-        self._store.reports.failed(report, str(error), again)
+        self._store.reports.failed(report, error.sentence, again)
         if again is None:
             _LOG.error("The report %s of %s is given up: %s", report.id, _subject(report), error)
         elif report.attempts == 1:

@@ -20,6 +20,7 @@ from sprag_study.service.delivery import origin_of
 from sprag_study.service.storage.part import Part, micros_of, moment, optional_moment
 from sprag_study.service.storage.people.audit import note
 from sprag_study.service.storage.schedules.tables import REPORTS, SCHEDULES
+from sprag_study.service.storage.stored_sentences import sentence_in, written
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -146,17 +147,20 @@ class Reports(Part):
     def sent(self, report: Claimed) -> None:
         """Record that the report was sent."""
         with self.session.write() as connection:
-            if self._end(connection, report, state=ReportState.SENT.value, ended_at=self._now(), problem=None):
+            if self._end(
+                connection, report, state=ReportState.SENT.value, ended_at=self._now(), **written("problem", None)
+            ):
                 note(connection, self._now(), "report.send", report.schedule, **_logged(report))
 
     def failed(self, report: Claimed, problem: str, next_try: datetime | None) -> None:
-        """Record why the report was not sent; with ``next_try`` None it is given up."""
+        """Record why the report was not sent, with the values of a Sentence; with ``next_try`` None it is given up."""
+        why = written("problem", problem)
         with self.session.write() as connection:
             if next_try is not None:
-                self._end(connection, report, next_try=micros_of(next_try), problem=problem)
+                self._end(connection, report, next_try=micros_of(next_try), **why)
                 return
-            if self._end(connection, report, state=ReportState.FAILED.value, ended_at=self._now(), problem=problem):
-                note(connection, self._now(), "report.fail", report.schedule, **_logged(report), problem=problem)
+            if self._end(connection, report, state=ReportState.FAILED.value, ended_at=self._now(), **why):
+                note(connection, self._now(), "report.fail", report.schedule, **_logged(report), problem=str(problem))
 
     @staticmethod
     def _end(connection: sa.Connection, report: Claimed, **values: object) -> bool:
@@ -184,7 +188,7 @@ class Reports(Part):
                     row.attempts,
                     moment(row.created_at),
                     optional_moment(row.ended_at),
-                    row.problem,
+                    sentence_in(row, "problem"),
                 )
                 found.setdefault((row.schedule_id, moment(row.due)), []).append(record)
         return found

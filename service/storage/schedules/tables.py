@@ -118,6 +118,8 @@ REPORTS = sa.Table(
     sa.Column("created_at", sa.BigInteger, nullable=False),
     sa.Column("ended_at", sa.BigInteger),
     sa.Column("problem", sa.Text),
+    # NULL: from before revision 0047.
+    sa.Column("problem_values", sa.Text),
     sa.UniqueConstraint("schedule", "due", "kind", "channel", "target", name="uq_reports_schedule"),
     sa.Index("ix_reports_state_next_try", "state", "next_try"),
     sqlite_autoincrement=True,

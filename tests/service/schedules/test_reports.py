@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from sprag_study.sentences import Sentence
 from sprag_study.service.delivery import Delivery, MailServer, Security
 from sprag_study.service.jobs.reports import channels
 from sprag_study.service.jobs.reports.channels import signature
@@ -183,6 +184,24 @@ def test_a_report_is_given_up_after_three_days_or_when_its_receiver_is_gone(
         ("reports", "The webhook answered 410."),
     ]
     assert all(row.detail["to"].count("/") == 2 for row in log)  # the origin: its path can be a secret
+
+
+def test_why_a_report_failed_is_said_in_the_language_of_the_reader(service: Service, clock: Clock, hook: Hook) -> None:
+    store = service.store
+    run_over(service, clock, report_webhook=hook.address)
+    claimed = store.reports.claim()
+    assert claimed is not None
+    store.reports.failed(claimed, Sentence("The webhook answered {status}.", status="503"), None)
+    page = {
+        language: service.http.get("/nights", headers={"Accept-Language": language}).text for language in ["en", "uk"]
+    }
+    assert ("The webhook answered 503." in page["en"], "Вебхук відповів 503." in page["uk"]) == (True, True)
+    (run,) = service.http.get("/api/v1/night", params={"hours": 744}).json()["runs"]
+    assert run["reports"][0]["problem"] == "The webhook answered 503."
+    with store.session.write() as connection:  # as earlier versions wrote it
+        connection.exec_driver_sql("UPDATE reports SET problem_values = NULL")
+    assert "The webhook answered 503." in service.http.get("/nights", headers={"Accept-Language": "uk"}).text
+    assert records(store)[0].problem == "The webhook answered 503."
 
 
 def test_a_process_that_dies_before_sending_loses_nothing(service: Service, clock: Clock, hook: Hook) -> None:
