@@ -75,8 +75,8 @@ TOGETHER = (
         for names in (
             "connection designers figures_in_browser me nights paper_and_phones rows_in_browser sheet study_pages "
             "study_rows",
-            "form_in_browser keys live machine_forms motion_pages order prefix_page report_walk returning script_texts "
-            "site toy_in_browser walks",
+            "form_in_browser keys live machine_forms motion_pages openid_in_browser order prefix_page report_walk "
+            "returning script_texts site toy_in_browser walks",
         )
     ),
     tuple(f"tests/acceptance/test_{name}.py" for name in ("bad_input", "commands", "notebook")),

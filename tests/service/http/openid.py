@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import json
 import re
+import sys
 import threading
 import time
 from base64 import urlsafe_b64encode
@@ -12,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs, urlencode, urlsplit
 
 import httpx
 from joserfc import jwt
@@ -36,10 +37,13 @@ class Openid:
     keys : that it publishes
     asked : forms that were sent to the token endpoint
     pause : seconds between two bytes of an answer
+    people : groups of those who can be chosen on its page, by name; a login has the claims of whoever was chosen
     """
 
-    def __init__(self, port: int) -> None:
-        self.issuer = f"http://127.0.0.1:{port}"
+    def __init__(self, port: int, host: str = "127.0.0.1") -> None:
+        self.issuer = f"http://{host}:{port}"
+        self.people: dict[str, list[str]] = {}
+        self._nonce = ""
         self.known = RSAKey.generate_key(2048, {"kid": "k1"})
         self.key: RSAKey | OctKey | None = self.known
         self.header: dict[str, str] = {"alg": "RS256", "kid": "k1"}
@@ -71,9 +75,24 @@ class Openid:
             }
         return {**given, "id_token": jwt.encode(self.header, kept, self.key, algorithms=["RS256", "HS256"])}
 
+    def page(self, asked: dict[str, str]) -> str:
+        """The page on which somebody says who it is, or does not."""
+        self._nonce = asked["nonce"]
+        back = f"{asked['redirect_uri']}?{urlencode({'state': asked['state']})}"
+        ways = {**{name: {"code": name} for name in self.people}, "nobody": {"error": "access_denied"}}
+        links = (f'<p><a href="{html.escape(f"{back}&{urlencode(more)}")}">{name}</a>' for name, more in ways.items())
+        return f"<!doctype html><title>Provider</title><h1>Who are you?</h1>{''.join(links)}"
+
+    def chosen(self, code: str) -> None:
+        """Answer with the claims of whoever the code is of, where people can be chosen."""
+        if code in self.people:
+            self.claims = {"nonce": self._nonce, "sub": code, "preferred_username": code, "groups": self.people[code]}
+
     def answer(self, path: str) -> tuple[int, Any]:
-        """Status and content for a path."""
+        """Status and content for a path; a page is a text."""
         match path.partition("?")[0]:
+            case "/authorize":
+                return 200, self.page({name: values[0] for name, values in parse_qs(urlsplit(path).query).items()})
             case "/.well-known/openid-configuration":
                 return 200, self.metadata()
             case "/keys":
@@ -86,8 +105,8 @@ class Openid:
 
 
 @contextmanager
-def openid() -> Iterator[Openid]:
-    """A provider that answers until the end of the block."""
+def openid(host: str = "127.0.0.1") -> Iterator[Openid]:
+    """A provider that answers until the end of the block; ``host`` is the name of this machine in its addresses."""
 
     class Handler(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
@@ -96,14 +115,16 @@ def openid() -> Iterator[Openid]:
         def do_POST(self) -> None:
             sent = self.rfile.read(int(self.headers["Content-Length"])).decode()
             form = {name: values[0] for name, values in parse_qs(sent).items()}
+            provider.chosen(form.get("code", ""))
             provider.asked.append({**form, "authorization": self.headers.get("Authorization", "")})
             self._say()
 
         def _say(self) -> None:
             status, content = provider.answer(self.path)
-            body = json.dumps(content).encode()
+            is_page = isinstance(content, str)
+            body = (content if is_page else json.dumps(content)).encode()
             self.send_response(status)
-            self.send_header("Content-Type", "application/json")
+            self.send_header("Content-Type", "text/html; charset=utf-8" if is_page else "application/json")
             self.send_header("Content-Length", str(len(body)))
             self.end_headers()
             if not provider.pause:
@@ -118,7 +139,7 @@ def openid() -> Iterator[Openid]:
             """Say nothing."""
 
     server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-    provider = Openid(server.server_port)
+    provider = Openid(server.server_port, host)
     thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.05})
     thread.start()
     try:
@@ -169,3 +190,15 @@ def why(answer: httpx.Response) -> str:
     found = re.search(r'<p class="fault" role="alert">(.*?)</p>', answer.text)
     assert found, answer.text
     return html.unescape(found[1])
+
+
+def main() -> None:
+    """A provider of the people in the first argument, JSON; prints its issuer, and ends with its standard input."""
+    with openid("localhost") as provider:
+        provider.people = json.loads(sys.argv[1])
+        print(provider.issuer, flush=True)
+        sys.stdin.read()
+
+
+if __name__ == "__main__":
+    main()
