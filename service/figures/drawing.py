@@ -144,8 +144,13 @@ def with_leaders(
 
 def _leader(dimension: Dimension, x: float, y: float) -> str:
     """A line from the label or the field of a dimension to its place, whose end moves with the machine."""
-    moves = f' data-on="{dimension.on}"' if dimension.on else ""
+    moves = _moves(dimension)
     return f'<path class="leader"{moves} d="M{x:g} {y:g}L{dimension.x:g} {dimension.y:g}"/>'
+
+
+def _moves(dimension: Dimension) -> str:
+    """What the mark of a dimension moves with, and its place while the machine stands still, as attributes."""
+    return f' data-on="{dimension.on}" data-at="{dimension.x:g} {dimension.y:g}"' if dimension.on else ""
 
 
 def _letters(drawing: Drawing, links: Mapping[str, str]) -> str:
@@ -158,7 +163,7 @@ def _letters(drawing: Drawing, links: Mapping[str, str]) -> str:
         across, down = each.apart or (-7.0 if each.side == "left" else 7.0, 0.0)
         end = ' text-anchor="end"' if across < -_ASIDE else "" if across > _ASIDE else ' text-anchor="middle"'
         text = (
-            f'<text class="letter" data-mark="{escape(each.path)}" x="{each.x + across:g}" '
+            f'<text class="letter" data-mark="{escape(each.path)}"{_moves(each)} x="{each.x + across:g}" '
             f'y="{each.y + down + 4:g}"{end}>{_printed(each.symbol)}</text>'
         )
         link = links.get(each.path)

@@ -87,10 +87,10 @@ const check = async () => {
   panel.querySelectorAll("details").forEach((part, index) => { part.open = Boolean(open[index]); });
   for (const place of form.querySelectorAll(".fit")) place.innerHTML = found.fits[place.id.slice("fit:".length)] || "";
   form.dataset.checked = String(mine);
+  document.dispatchEvent(new Event("sprag:checked"));
   if (!left || document.activeElement.name === left) return;
   typed = typed === left ? "" : typed;
-  if (found.rows !== form.querySelector("section.varies").dataset.rows) reshape([]);
-  document.dispatchEvent(new Event("sprag:checked"));
+  if (found.rows !== form.querySelector("section.varies")?.dataset.rows) reshape([]);
 };
 
 // The text of a file in UTF-8, UTF-16 with a byte order mark, or a code page of Windows, as `decoded` in table_text.py has it.

@@ -7,12 +7,12 @@ sprag.sheet = (() => {
   const one = (id) => document.getElementById(id);
   const drawings = () => [...document.querySelectorAll(".picture svg")];
 
-  // The ends of the lines from labels and fields follow what they point at.
+  // The ends of the lines from labels and fields follow what they point at, and so do letters.
   const follow = (svg, place) => {
-    for (const line of svg.querySelectorAll(".leader[data-on]")) {
-      line.still ||= line.getAttribute("d").match(/-?[\d.]+(?:e-?\d+)?/g).map(Number);
-      const [x, y, ...end] = line.still;
-      line.setAttribute("d", `M${x} ${y}L${place(line.dataset.on, ...end).join(" ")}`);
+    for (const mark of svg.querySelectorAll("[data-on]")) {
+      const still = mark.dataset.at.split(" ").map(Number), [x, y] = place(mark.dataset.on, ...still);
+      if (mark.matches(".letter")) mark.setAttribute("transform", `translate(${x - still[0]} ${y - still[1]})`);
+      else mark.setAttribute("d", `${mark.getAttribute("d").split("L")[0]}L${x} ${y}`);
     }
   };
 

@@ -333,6 +333,8 @@ def test_the_machine_moves_while_it_is_drawn(visitor: Visitor) -> None:
     still = arm.get_attribute("transform")
     page.locator("#instant").press("ArrowRight")
     expect(arm).not_to_have_attribute("transform", str(still))
+    letter = page.locator('.picture .letter[data-mark="pendulums.0.mass"]')
+    expect(letter).to_have_attribute("transform", re.compile(r"^translate\((?!0 0\))"))
     named(page, "/base/shaft/load").fill("0.3")
     expect(speed).not_to_have_attribute("data-value", str(before))
     expect(page.locator(".live-figure svg")).to_be_visible()
