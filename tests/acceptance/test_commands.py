@@ -331,6 +331,7 @@ def test_doctor_finds_the_installation_sound(tmp_path: Path, sprag: Sprag) -> No
         "clock",
         "workers",
         "schedules",
+        "service of commands",
         "kernel cache",
         "engine",
     } == {finding["subject"] for finding in done.data["findings"]}
