@@ -1,6 +1,6 @@
 """Settled motions: how many are found, what they cost, and how they compare with runs of 20,000 periods.
 
-    python -m benchmarks.settled [--long PERIODS] [--drives COUNT] [--costs-only]
+    python -m benchmarks.settled [--long PERIODS] [--drives COUNT] [--heavy COUNT] [--costs-only]
 
 Costs are ratios to the same cases run for 60 periods, in processor time of the same process.
 """
@@ -40,8 +40,9 @@ _REPEATS = 7
 _PIECE, _HIGHEST = 200, 64
 #: Tolerance and periods of the runs that follow the long ones of periodic cases.
 _FINE, _FINE_PERIODS = 1e-12, 2_000
-#: How much longer cases are run whose orders after the long run are others than those found.
-_LONGER = 20
+#: How much longer cases are run whose orders after the long run are others than those found, or whose multipliers leave
+#: more than this of a disturbance after it.
+_LONGER, _ARRIVED = 20, 1e-12
 #: Results that depend on how the motion was come to, or are zero up to rounding.
 NOT_COMPARED = {"run.events", "run.steps", "runup.time", "balance.energy", "balance.momentum", "power.stored.mean"}
 
@@ -78,6 +79,13 @@ def random_drives(count: int, pendulums: int, seed: int) -> dict[str, Floats | f
             f"pendulums.{i}.backlash": between(0.0, 0.012),
         }
     return columns
+
+
+def heavy_shafts(count: int, seed: int) -> dict[str, Floats | float]:
+    """Drives of one pendulum whose shafts have 0.003 to 3,000 times its inertia."""
+    columns = random_drives(count, 1, seed)
+    ratios = np.exp(np.random.default_rng(seed + 1000).uniform(math.log(0.003), math.log(3000.0), count))
+    return columns | {"shaft.inertia": ratios * columns["pendulums.0.inertia"]}
 
 
 def _of(columns: dict[str, Any], cases: Ints) -> dict[str, Any]:
@@ -201,7 +209,10 @@ def compare(name: str, columns: dict[str, Any], cases: int, periods: int) -> Flo
     batch = settle(columns, SettledRun(), cases=cases)
     long = long_run(columns, cases, periods)
     found = np.isin(batch.regimes, _FOUND)
-    doubtful = np.flatnonzero(found & (_column(batch, n, "regime.order") != long.orders))
+    orders = _column(batch, n, "regime.order")
+    with np.errstate(invalid="ignore"):
+        arrives = _column(batch, n, "regime.multiplier") ** (periods / orders) < _ARRIVED
+    doubtful = np.flatnonzero(found & ((orders != long.orders) | ~arrives))
     if len(doubtful):
         # Motions with a multiplier near 1 are still on their way, or repeat well enough only after some turn of theirs.
         longer = long_run(_of(columns, doubtful), len(doubtful), _LONGER * periods)
@@ -210,7 +221,7 @@ def compare(name: str, columns: dict[str, Any], cases: int, periods: int) -> Flo
     both = periodic & found
     off, names = deviations(batch.values, long.values, n)
     off = off[both]
-    same = _column(batch, n, "regime.order") == long.orders
+    same = orders == long.orders
     regimes = Counter(Regime(int(code)).name.lower() for code in batch.regimes)
     print(f"{name}: {dict(regimes)}")
     print(
@@ -280,6 +291,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--long", type=int, default=20_000, metavar="PERIODS")
     parser.add_argument("--drives", type=int, default=300, metavar="COUNT", help="with one, two, three pendulums each")
+    parser.add_argument("--heavy", type=int, default=400, metavar="COUNT", help="drives with shafts of any inertia")
     parser.add_argument("--costs-only", action="store_true")
     chosen = parser.parse_args()
     held = []
@@ -292,6 +304,9 @@ def main() -> None:
         columns = random_drives(chosen.drives, pendulums, seed=pendulums)
         name = f"{chosen.drives} random drives, {pendulums} pendulum{'s' * (pendulums > 1)}"
         held.append(compare(name, columns, chosen.drives, chosen.long))
+    if not chosen.costs_only and chosen.heavy:
+        name = f"{chosen.heavy} random drives, shafts of 0.003 to 3,000 times the pendulum's inertia"
+        held.append(compare(name, heavy_shafts(chosen.heavy, seed=38), chosen.heavy, chosen.long))
     if held:
         compare_unloaded(chosen.drives, chosen.long)
         cases, speeds = sum(map(len, held)), np.concatenate([inside[:, 0] for inside in held])

@@ -10,7 +10,7 @@ from sprag_study.engine.endings import Ending
 from sprag_study.engine.run import Run, Span
 
 #: Increased whenever a change of the engine can change a stored number.
-ENGINE_VERSION = "6"
+ENGINE_VERSION = "7"
 
 __all__ = ["ENGINE_VERSION", "Ending", "Run", "Span"]
 

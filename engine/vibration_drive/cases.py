@@ -118,6 +118,14 @@ def unloaded(matrix: Floats, pendulums: int) -> NDArray[np.bool_]:
     return free
 
 
+def inertia_ratio(matrix: Floats, pendulums: int) -> Floats:
+    """Inertia of the shaft of each case of a matrix over that of its pendulums together, shape (cases,)."""
+    width = (matrix.shape[1] - stop_column(STOPS)) // pendulums
+    inertias = matrix[:, stop_column(STOPS) + PendulumColumn.INERTIA :: width]
+    ratio: Floats = matrix[:, Column.INERTIA] / np.add.reduce(inertias, axis=1)
+    return ratio
+
+
 def _stop(time: Floats) -> tuple[Floats, Floats]:
     """Split times in periods into whole periods and a fraction in (0, 1]; time 0 is (0, 0)."""
     nearest = np.rint(time)

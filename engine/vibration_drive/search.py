@@ -41,7 +41,7 @@ ROUND = 40
 #: Strobes this close to those one orbit earlier, and approaching them, justify Newton's method.
 NEAR = 0.01
 #: The same, divided by the order: irregular motions return by chance, and trying a long orbit is expensive.
-_SHARED = 0.035
+SHARED = 0.035
 #: Strobes over which a run must have approached the orbit.
 WINDOW = 6
 #: Distance of an orbit from the run beyond which the run need not approach it.
@@ -54,6 +54,8 @@ DISTURBANCE = 1e-7
 RESIDUAL = 1e-10
 #: A multiplier up to this is stable; with a residual below the second number an unstable one ends Newton's method.
 STABLE = 1.0 - 1e-4
+#: The same for orbits of slow shafts (`slow`), which disturbances leave within thousands of periods.
+STABLE_SLOWLY = 1.0 - 1e-6
 _TELLING = 1e-2
 _STEPS = 8
 #: Steps after which an orbit with a small residual is accepted although rounding prevents its steps from shrinking.
@@ -215,28 +217,33 @@ class Search:
         units = self.units(active)
         found = np.zeros(len(active), dtype=np.int64)
         orbits.find_candidates(
-            self.history, active, self.count, units, NEAR, _SHARED, WINDOW, self.settings.max_period, found
+            self.history, active, self.count, units, NEAR, SHARED, WINDOW, self.settings.max_period, found
         )
         rows = np.flatnonzero(found)
         # The longest runs first, because the last ones leave lanes idle.
         rows = rows[np.argsort(-found[rows], kind="stable")]
         certified = self.certify(active[rows], self.starts[active[rows]], found[rows], units[rows])
-        return self._of_least_order(certified)
+        return self.of_least_order(certified)
 
-    def certify(self, cases: Ints, points: Floats, orders: Ints, units: Floats) -> Orbits:
-        """Newton's method from points near orbits of those orders; the stable ones that the runs are near."""
+    def certify(self, cases: Ints, points: Floats, orders: Ints, units: Floats, *, slaved: bool = False) -> Orbits:
+        """Newton's method from points near orbits of those orders; the stable ones that the runs are near.
+
+        With ``slaved`` the points are those to which the speeds of slow shafts were moved (`slow.march`): these must
+        be within ``AWAY``, and multipliers may be closer to 1.
+        """
         begun = points
+        run, stable = (self.settings.fine, STABLE_SLOWLY) if slaved else (self.run, STABLE)
         certified: list[Orbits] = []
         for number in range(_STEPS):
             if not len(cases):
                 break
-            moved, told, turns = self._step(cases, points, orders, units, self.run)
+            moved, told, turns = self._step(cases, points, orders, units, run)
             away = np.empty(len(cases))
             orbits.distances(moved, begun, units, away)
             residual, size, multiplier = told[:, newton.RESIDUAL], told[:, newton.STEP], told[:, newton.MULTIPLIER]
-            close = away < np.where(self.periods[cases] < SLOWLY_FROM, AWAY, SLOWLY_AWAY)
+            close = away < np.where(slaved | (self.periods[cases] < SLOWLY_FROM), AWAY, SLOWLY_AWAY)
             converged = (residual < RESIDUAL) & ((size < RESIDUAL) | (number >= _ENOUGH_STEPS))
-            accepted = converged & (multiplier < STABLE) & close
+            accepted = converged & (multiplier < stable) & close
             slow = np.flatnonzero(accepted & (away >= AWAY))
             if len(slow):
                 accepted[slow] = self._approaches(cases[slow], turns[slow], orders[slow], units[slow], multiplier[slow])
@@ -247,7 +254,7 @@ class Search:
                 better = np.where((size < RESIDUAL)[:, None], moved, points)
                 certified.append(Orbits(cases, better, orders, multiplier, residual, least, units).take(accepted))
             fails = converged | (told[:, newton.AGREES] == 0.0) | ~(size < 1.0) | ~close
-            fails |= (residual < _TELLING) & (multiplier >= STABLE)
+            fails |= (residual < _TELLING) & (multiplier >= stable)
             self._failed(cases[fails & ~accepted])
             left = np.flatnonzero(~(fails | accepted))
             cases, orders = cases[left], orders[left]
@@ -272,15 +279,16 @@ class Search:
         newton.step(points, ends, first, units, DISTURBANCE, self.steady_shaft, tied, moved, told)
         return moved, told, done.strobes[first[:-1]]
 
-    def refined(self, found: Orbits) -> Orbits:
+    def refined(self, found: Orbits, *, slaved: bool = False) -> Orbits:
         """The same orbits, the sensitive ones of them after further steps with finer integration."""
+        stable = STABLE_SLOWLY if slaved else STABLE
         rows = np.flatnonzero(found.multipliers > _SENSITIVE)
         for _ in range(_FINE_STEPS):
             if not len(rows):
                 break
             some = found.take(rows)
             moved, told, _ = self._step(some.cases, some.points, some.orders, some.units, self.settings.fine)
-            good = (told[:, newton.RESIDUAL] < RESIDUAL) & (told[:, newton.MULTIPLIER] < STABLE)
+            good = (told[:, newton.RESIDUAL] < RESIDUAL) & (told[:, newton.MULTIPLIER] < stable)
             rows, moved, told = rows[good], moved[good], told[good]
             found.points[rows] = moved
             found.residuals[rows], found.multipliers[rows] = told[:, newton.RESIDUAL], told[:, newton.MULTIPLIER]
@@ -336,13 +344,13 @@ class Search:
         self.starts[active, FRACTION] = MOVED
         self.count = 0
 
-    def _of_least_order(self, found: Orbits) -> Orbits:
+    def of_least_order(self, found: Orbits, *, slaved: bool = False) -> Orbits:
         """The same orbits with their least orders."""
         again = np.flatnonzero(found.least < found.orders)
         if not len(again):
             return found
         cases = found.cases[again]
-        better = self.certify(cases, found.points[again], found.least[again], found.units[again])
+        better = self.certify(cases, found.points[again], found.least[again], found.units[again], slaved=slaved)
         kept = ~np.isin(found.cases, better.cases)
         return joined([found.take(kept), better], self)
 

@@ -2,15 +2,15 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sprag_study.engine.endings import ENDINGS, Ending
 from sprag_study.engine.run import MEANS_FROM_PERIODS, SettledRun
-from sprag_study.engine.vibration_drive.cases import Column, case_matrix, pendulum_count, unloaded
-from sprag_study.engine.vibration_drive.irregular import BATCHES, Batches
+from sprag_study.engine.vibration_drive.cases import Column, case_matrix, inertia_ratio, pendulum_count, unloaded
+from sprag_study.engine.vibration_drive.irregular import BATCHES, LONG, Batches, Means
 from sprag_study.engine.vibration_drive.kernel import Kernel, kernel_of
 from sprag_study.engine.vibration_drive.lanes import RUNUP_SHARE
 from sprag_study.engine.vibration_drive.no_load import limit_of
@@ -18,6 +18,7 @@ from sprag_study.engine.vibration_drive.orbits import distances, settling_period
 from sprag_study.engine.vibration_drive.regimes import Regime, means, settled_infos
 from sprag_study.engine.vibration_drive.results import STEADY_SHAFT, result_infos
 from sprag_study.engine.vibration_drive.search import ROUND, RUNS, Orbits, Search, joined, transient_rounds
+from sprag_study.engine.vibration_drive.slow import march
 from sprag_study.engine.vibration_drive.strobes import (
     ANGLE,
     FRACTION,
@@ -40,6 +41,12 @@ _UNCHANGED = 40
 #: How far (relative) below the limit speed a shaft may be that still rises to it, and how far (scaled) its pendulums
 #: may be from their contact-free orbit.
 _CREEPS, _FREELY = 0.01, 0.01
+#: A shaft with so many times the inertia of its pendulums may change its speed slowly.
+_HEAVY = 10.0
+#: How often cases whose search gave up get as many longer batches again.
+_LATER = 2
+#: Periods before them.
+_TRANSIENT = 200
 _OK = ENDINGS.index(Ending.OK)
 _REPEATING = [regime for regime in Regime if regime.repeats]
 
@@ -160,12 +167,65 @@ def _settle(search: Search, active: Ints, results: _Results) -> None:
         _write(search, search.refined(orbits), results)
     if len(active):
         irregular = batches.finish(active)
-        results.values[active, : results.plain] = irregular.values
-        results.values[active, -len(results.means) :] = irregular.half_widths
-        results.put(active, "regime.exponent", irregular.exponents)
-        results.regimes[active] = irregular.regimes
-        results.points[active] = search.starts[active]
-        _whole_run(search, active, results)
+        _write_irregular(search, active, irregular, search.starts[active], results)
+        slow = inertia_ratio(search.matrix[active], search.kernel.LAYOUT.n) >= _HEAVY
+        slow &= (irregular.regimes == Regime.UNSETTLED) & (batches.count == BATCHES) & (not search.steady_shaft)
+        if np.any(slow):
+            _settle_slowly(search, active[slow], results)
+
+
+def _settle_slowly(search: Search, cases: Ints, results: _Results) -> None:
+    """Write the results of heavy shafts whose search gave up, where their motions settle over thousands of periods.
+
+    Their speeds are brought to where they do not change. Motions without an orbit there take longer batches. Where
+    these tell no steady mean either, the results stay as they are.
+    """
+    slaved, points = march(search, cases)
+    if len(slaved.cases):
+        _write(search, search.refined(slaved, slaved=True), results, slaved=True)
+    rest = ~np.isin(cases, slaved.cases)
+    cases, points = cases[rest], points[rest]
+    if not len(cases):
+        return
+    matrix = search.matrix[cases].copy()
+    matrix[:, Column.MOST_STEPS] /= RUNS
+    at_most = _TRANSIENT + _LATER * BATCHES * LONG
+    later = Search(search.kernel, matrix, replace(search.settings, at_most=at_most), given=points)
+    batches, ends = Batches(later, 0, LONG), _Results(len(cases), search.kernel.LAYOUT.n, points.shape[1])
+    active, found = np.arange(len(cases)), list[Orbits]()
+    for periods in transient_rounds(_TRANSIENT):
+        if len(active):
+            later.advance(active, periods, windowed=False)
+            active = _take_settled(later, active, found, ends)
+    for number in range(_LATER):
+        if number:
+            found.append(march(later, active)[0])
+            active = active[~np.isin(active, found[-1].cases)]
+        batches.count += BATCHES
+        while len(active) and len(batches.sums) < batches.count:
+            batches.advance(active)
+            active = _take_settled(later, active, found, ends)
+        if not len(active):
+            break
+        irregular = batches.finish(active)
+        steady = irregular.regimes == Regime.IRREGULAR
+        _write_irregular(search, cases[active[steady]], irregular.take(steady), later.starts[active[steady]], results)
+        active = active[~steady]
+    search.spent[cases] += later.spent
+    orbits = joined(found, later)
+    if len(orbits.cases):
+        orbits.cases = cases[orbits.cases]
+        _write(search, search.refined(orbits, slaved=True), results, slaved=True)
+
+
+def _write_irregular(search: Search, cases: Ints, irregular: Means, points: Floats, results: _Results) -> None:
+    """Write the means of cases without an orbit, whose runs ended at ``points``."""
+    results.values[cases, : results.plain] = irregular.values
+    results.values[cases, -len(results.means) :] = irregular.half_widths
+    results.put(cases, "regime.exponent", irregular.exponents)
+    results.regimes[cases] = irregular.regimes
+    results.points[cases] = points
+    _whole_run(search, cases, results)
 
 
 def _search(search: Search, active: Ints, found: list[Orbits], results: _Results) -> tuple[Batches, Ints]:
@@ -204,13 +264,14 @@ def _take_settled(search: Search, active: Ints, found: list[Orbits], results: _R
     return active[~np.isin(active, found[-1].cases)]
 
 
-def _write(search: Search, found: Orbits, results: _Results) -> None:
+def _write(search: Search, found: Orbits, results: _Results, *, slaved: bool = False) -> None:
     cases = found.cases
+    results.values[cases] = np.nan
     results.values[cases, : results.plain] = search.over_one_turn(found)
     results.put(cases, "regime.order", found.orders)
     results.put(cases, "regime.multiplier", found.multipliers)
     results.put(cases, "regime.residual", found.residuals)
-    results.put(cases, "regime.settled_after", _settled_after(search, found))
+    results.put(cases, "regime.settled_after", _settled_after(search, found, slaved=slaved))
     results.points[cases] = found.points
     held = results.values[cases, results.column("fraction.rotating")] == 0.0
     results.points[cases[held], SHAFT_SPEED] = 0.0
@@ -218,11 +279,17 @@ def _write(search: Search, found: Orbits, results: _Results) -> None:
     _whole_run(search, cases, results)
 
 
-def _settled_after(search: Search, found: Orbits) -> Floats:
-    """Periods from the start until a run is within the settled distance of its orbit, by the orbit's multiplier."""
+def _settled_after(search: Search, found: Orbits, *, slaved: bool) -> Floats:
+    """Periods from the start until a run is within the settled distance of its orbit, by the orbit's multiplier.
+
+    Where the pendulums are ``slaved`` to a slow shaft, its speed alone counts.
+    """
     cases = found.cases
     apart, periods = np.empty(len(cases)), np.empty(len(cases))
-    distances(search.starts[cases], found.points, found.units, apart)
+    if slaved:
+        apart = np.abs(search.starts[cases] - found.points)[:, SHAFT_SPEED] / found.units[:, SHAFT_SPEED]
+    else:
+        distances(search.starts[cases], found.points, found.units, apart)
     settling_periods(apart, found.orders, found.multipliers, search.settings.settled, periods)
     return search.periods[cases] + periods
 
