@@ -102,7 +102,10 @@ def check(
     if wants_json():
         write_json({"valid": True, **made})
         return
-    print(_("{file}: valid, {cases} cases", file=spec, cases=made["cases"]))
+    if made["most_rounds"] > 1:
+        print(_("{file}: valid, at most {cases} cases", file=spec, cases=made["most_cases"]))
+    else:
+        print(_("{file}: valid, {cases} cases", file=spec, cases=made["cases"]))
     _show_preview(made)
     if made["reusable"]:
         write_text(_("{count} of the cases need not be run: the database has them", count=made["reusable"]) + "\n")

@@ -121,6 +121,7 @@ def test_a_spec_takes_its_points_without_a_view_too(
     points.write_text("shaft.load [N*mm]\n50\n75\n")
     done = sprag("show", sources[0], "--points", points)
     assert (done.code, "valid, 2 cases" in done.out) == (0, True), done.err
+    assert "least_flywheel: valid, at most 1280 cases" in sprag("check", "least_flywheel").out
     done = sprag("show", sources[0], "curves", "--points", points, "--y", "shaft.speed.mean", "--json")
     assert json.loads(done.out)["curves"][0]["x"] == [0.05, 0.075]
     done = sprag("show", sources[1], "--points", points)
