@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import rainflow
 
+from sprag_study.engine import elementary
+
 #: Part of the largest range below which ranges are rounding.
 _ROUNDING = 1e-6
 #: Part of the largest range within which cycles are alike.
@@ -65,5 +67,6 @@ def equivalent(counted: Sequence[Cycle], exponent: float, number: float) -> floa
     top = max((cycle.size for cycle in counted), default=0.0)
     if not top > 0.0:
         return 0.0
-    damage = sum(cycle.number * (cycle.size / top) ** exponent for cycle in counted)
-    return float(top * (damage / number) ** (1.0 / exponent))
+    shares = elementary.power([cycle.size / top for cycle in counted], exponent)
+    damage = math.fsum(cycle.number * share for cycle, share in zip(counted, shares.tolist(), strict=True))
+    return top * float(elementary.power(damage / number, 1.0 / exponent))
