@@ -6,17 +6,18 @@ import re
 from typing import Final
 
 from sprag_study.service.reading.together import typed_unit, with_last_unit
+from sprag_study.worker.limits import MAX_QUANTITY_LENGTH
 
 _SIGN: Final = "[-+\u2212\u2013]"
 _ZERO: Final = r"0(?:[.,]0*)?(?![.,\d])"
-#: Two deviations with a slash between; a rising and a falling one also with a blank.
-_TWO: Final = (
-    rf"(?:{_SIGN}\s*[.,\d][^±]*?|{_ZERO}[^±]*?)\s*/\s*(?:{_SIGN}\s*[.,\d]|{_ZERO})[^±]*"
-    rf"|\+\s*[.,\d][^±]*?\s(?:[-\u2212\u2013]\s*[.,\d]|{_ZERO})[^±]*"
-)
-_PAIR: Final = re.compile(_TWO)
-_BETWEEN: Final = re.compile(rf"\s*/\s*(?={_SIGN}|{_ZERO})|\s+(?=[-\u2212\u2013]\s*[.,\d]|{_ZERO})")
-_VALUE: Final = re.compile(rf"([^±]*?\d[^±]*?)\s+({_TWO})")
+_BEGINNING: Final = re.compile(f"{_SIGN}|{_ZERO}")
+#: Between two deviations: a slash, or a blank before one that falls.
+_BETWEEN: Final = re.compile(rf"\s*/\s*(?={_SIGN}|{_ZERO})|\s+(?=[-\u2212\u2013]|{_ZERO})")
+_RISING: Final = re.compile(rf"\+|{_ZERO}")
+#: Between a value and its tolerance.
+_BEFORE: Final = re.compile(r"\s*±\s*|\s+")
+#: A number in what stands behind a number: a list or a range, whose last unit is no unit.
+_NUMBER: Final = re.compile(r"(?:^|[\s,;])\d")
 
 
 def deviations(text: str) -> tuple[str, str] | None:
@@ -24,17 +25,20 @@ def deviations(text: str) -> tuple[str, str] | None:
 
     A unit of one of them is that of both.
     """
-    if _PAIR.fullmatch(text.strip()) is None:
+    text = text.strip()
+    if len(text) > MAX_QUANTITY_LENGTH or not _BEGINNING.match(text):
         return None
-    first, second = (
-        re.sub(rf"({_SIGN})\s+", r"\1", part, count=1) for part in _BETWEEN.split(text.strip(), maxsplit=1)
-    )
-    units = typed_unit(first), typed_unit(second)
-    if units[0] == "" and units[1]:
-        first = f"{first} {units[1]}"
-    elif units[1] == "" and units[0]:
-        second = f"{second} {units[0]}"
-    return first, second
+    for gap in _BETWEEN.finditer(text):
+        first, second = (re.sub(rf"^({_SIGN})\s+", r"\1", part) for part in (text[: gap.start()], text[gap.end() :]))
+        units = _unit(first), _unit(second)
+        if None in units or not ("/" in gap[0] or _RISING.match(first)):
+            continue
+        if units[0] == "" and units[1]:
+            first = f"{first} {units[1]}"
+        elif units[1] == "" and units[0]:
+            second = f"{second} {units[0]}"
+        return first, second
+    return None
 
 
 def with_tolerance(text: str) -> tuple[str, str] | None:
@@ -42,14 +46,23 @@ def with_tolerance(text: str) -> tuple[str, str] | None:
 
     A unit at the end is that of a bare value before it.
     """
-    if "±" in text:
-        value, tolerance = (part.strip() for part in with_last_unit(text.split("±", 1)))
-    elif found := _VALUE.fullmatch(text.strip()):
-        value, tolerance = found[1], found[2]
-        pair = deviations(tolerance) or ("", "")
-        value = with_last_unit([value, pair[1]])[0]
-        unit = typed_unit(value)
-        tolerance = f"{tolerance} {unit}" if unit and typed_unit(pair[1]) == "" else tolerance
-    else:
-        return None
-    return (value, tolerance) if value and tolerance else None
+    text = text.strip()
+    for gap in _BEFORE.finditer(text) if len(text) <= MAX_QUANTITY_LENGTH else ():
+        value, tolerance = text[: gap.start()], text[gap.end() :]
+        pair = deviations(tolerance)
+        if _unit(value) is None or not tolerance or not (pair or "±" in gap[0]):
+            continue
+        if pair is None:
+            value, tolerance = with_last_unit([value, tolerance])
+        else:
+            value = with_last_unit([value, pair[1]])[0]
+            unit = _unit(value)
+            tolerance = f"{tolerance} {unit}" if unit and _unit(pair[1]) == "" else tolerance
+        return value, tolerance.strip()
+    return None
+
+
+def _unit(text: str) -> str | None:
+    """The unit of one quantity; None for what is none, and for several."""
+    unit = typed_unit(text)
+    return None if unit is None or _NUMBER.search(unit) else unit
