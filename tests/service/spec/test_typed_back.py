@@ -219,7 +219,7 @@ def test_every_example_is_read_as_a_person_reads_it(text: str) -> None:
 def test_no_placeholder_escapes() -> None:
     """Each placeholder is a text of the catalogues, one that `templates` collects, or an expression that is known."""
     known = (
-        r"form\.example\(\"\w+\"\)", r"field\.example \| typed",
+        r"form\.example\(\"\w+\"\)( \| typed)?", r"field\.example \| typed",
         r"\(default or example\) \| typed", r"example( \| typed)?", r"help",
         r"ends\[[01]\].*", r"usual_points", r".* \| number(\(4\))?",
         r"_\(\"[^\"]*\"\)", r".*\| unit", r".*\| safe( if .*)?",
