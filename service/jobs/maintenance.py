@@ -160,6 +160,12 @@ class Maintenance(threading.Thread):
         self._watch = watch or ClockWatch(store.dispatchers)
         self._ending = threading.Event()
         self._tasks: list[_Task] = []
+        #: What was wrong when it was still watched; another worker of the database may watch it, so that it ends once.
+        self._unwatched: list[AlertKind] = []
+        if not (plan.least_free and self._folders()):
+            self._unwatched.append("disk")
+        if plan.folder is None:
+            self._unwatched.append(_BACKUP)
         self._tasks.append(_Task("deletion of old reports", self._prune_reports))
         if plan.folder is not None:
             self._tasks.append(_Task(_BACKUP, partial(self._back_up, plan.folder)))
@@ -188,9 +194,9 @@ class Maintenance(threading.Thread):
     def _look(self, now: datetime) -> None:
         due = self._plan.timing.latest_until(now)
         assert due is not None, "a time of day comes every day"
+        while self._unwatched:
+            self._alert(self._unwatched.pop(), None)
         self._look_at_disks()
-        if self._plan.folder is None:
-            self._alert(_BACKUP, None)
         try:
             believed = self._watch.believable()
         except StoreError as error:
@@ -218,18 +224,16 @@ class Maintenance(threading.Thread):
                 self._alert(_BACKUP, None)
             task.done, task.wait_until = due, None
 
+    def _folders(self) -> list[Path]:
+        """Those of the database and of the backups on this machine."""
+        session, folder = self._store.session, self._plan.folder
+        return [*([] if session.on_server else [session.path.parent]), *([folder] if folder else [])]
+
     def _look_at_disks(self) -> None:
-        """Begin or end the alert of the disks of the database and of the backups; end it where none is watched."""
-        least, session = self._plan.least_free, self._store.session
-        folders = [
-            *([] if session.on_server else [session.path.parent]),
-            *([self._plan.folder] if self._plan.folder else []),
-        ]
-        if not (least and folders):
-            self._alert("disk", None)
-            return
-        free = {folder: size for folder in folders if (size := _free(folder)) is not None}
-        if not free:
+        """Begin or end the alert of the disks of the database and of the backups."""
+        least = self._plan.least_free
+        free = {folder: size for folder in self._folders() if (size := _free(folder)) is not None}
+        if not (least and free):
             return
         fullest = min(free, key=lambda folder: free[folder])
         if free[fullest] < least:

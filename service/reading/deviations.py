@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import Final
 
+from sprag_study.service.reading.ranges import could_be_several
 from sprag_study.service.reading.together import typed_unit, with_last_unit
 from sprag_study.worker.limits import MAX_QUANTITY_LENGTH
 
@@ -16,8 +17,6 @@ _BETWEEN: Final = re.compile(rf"\s*/\s*(?={_SIGN}|{_ZERO})|\s+(?=[-\u2212\u2013]
 _RISING: Final = re.compile(rf"\+|{_ZERO}")
 #: Between a value and its tolerance.
 _BEFORE: Final = re.compile(r"\s*±\s*|\s+")
-#: A number in what stands behind a number: a list or a range, whose last unit is no unit.
-_NUMBER: Final = re.compile(r"(?:^|[\s,;])\d")
 
 
 def deviations(text: str) -> tuple[str, str] | None:
@@ -64,5 +63,4 @@ def with_tolerance(text: str) -> tuple[str, str] | None:
 
 def _unit(text: str) -> str | None:
     """The unit of one quantity; None for what is none, and for several."""
-    unit = typed_unit(text)
-    return None if unit is None or _NUMBER.search(unit) else unit
+    return None if could_be_several(text) else typed_unit(text)

@@ -80,7 +80,8 @@ class TypedRange:
 
 def typed_range(text: str) -> TypedRange | None:
     """The range that a text is; None for anything else, such as a single quantity."""
-    parts = _RANGE.fullmatch(text) if len(text) <= _LONGEST else None
+    # Many blanks in a row could be parted in many ways.
+    parts = _RANGE.fullmatch(re.sub(r"\s{2,}", " ", text)) if len(text) <= _LONGEST else None
     texts = settled([parts[name] or "" for name in ("first", "last", "step")]) if parts else []
     if parts is None or not all(_is_quantity(text) for text in texts if text):
         return None

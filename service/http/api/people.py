@@ -106,7 +106,8 @@ async def change_user(
 ) -> Response:
     """Change the role or the limits of a user, or remove or restore the user; what is left out is kept.
 
-    Tokens and sessions of a removed user end at once; studies and schedules are kept. The last administrator stays.
+    Tokens and sessions of a removed user end within two seconds; studies and schedules are kept. The last
+    administrator stays.
     """
     change = await work.read(users.read_user_change, received)
     return await _changed(request, users.changed, context.store.people, user, change)

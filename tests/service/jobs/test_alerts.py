@@ -156,8 +156,13 @@ def test_an_alert_ends_when_nothing_is_watched_any_more(
     assert {alert.kind for alert in store.alerts.present()} == {"backup", "disk"}
     Maintenance(store, MaintenancePlan(least_free=GB)).look()
     assert [alert.kind for alert in store.alerts.present()] == ["disk"]
-    Maintenance(store, MaintenancePlan(least_free=0)).look()
+    unwatched = Maintenance(store, MaintenancePlan(least_free=0))
+    unwatched.look()
     assert store.alerts.present() == ()
+    # Another worker of the database watches: its alert is not ended and begun by turns.
+    Maintenance(store, MaintenancePlan(folder, least_free=GB)).look()
+    unwatched.look()
+    assert {alert.kind for alert in store.alerts.present()} == {"backup", "disk"}
 
 
 def test_alerts_are_mails_and_webhooks_in_the_language_of_the_office(

@@ -72,7 +72,7 @@ def settle(values: Values, *, with_ticks: bool = True) -> None:
     for name in [name for name in values if name.startswith(VARY)]:
         del values[name]
     for part, paths in known if with_ticks else ():
-        for path in paths:
+        for path in dict.fromkeys(paths):
             if path not in changed:
                 _vary(values, part, path, wanted=path in varying)
             _take_values(values, part, path)
@@ -229,7 +229,7 @@ def _take_values(values: Values, name: str, path: str) -> None:
     """Let a number vary over the list or range that somebody has typed into its field, which keeps the first value."""
     field = base_pointer(path)
     text = values.get(field, "").strip()
-    if text.startswith("=") or (typed_range(text) is None and len(list(filter(None, text.split(";")))) < _SEVERAL):
+    if text.startswith("=") or (typed_range(text) is None and len(split_list(text)) < _SEVERAL):
         return
     _vary(values, name, path, wanted=True)
     row = varied(values, name).get(path)

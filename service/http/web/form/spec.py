@@ -52,6 +52,8 @@ GOAL_DEFAULTS: Final[Values] = {
     "/goal/over": "worst",
     "/goal/polish": "on",
 }
+#: Digits of a count of values at most.
+_COUNT_DIGITS: Final = 7
 #: Entries of an axis that are ranges without a step, and their spacing.
 _SPACINGS: Final[dict[str, Spacing]] = {"linspace": "even", "geomspace": "geometric", "adaptive": "refined"}
 #: Kinds of limits with their labels.
@@ -99,9 +101,10 @@ def with_row_texts(values: Mapping[str, str]) -> Values:
     for name in [name for name in values if re.fullmatch(r"/(?:axes|goal/vary)/\d+/way", name)]:
         row = name.removesuffix("/way")
         way, *texts, count = (found.pop(f"{row}/{part}", "").strip() for part in ("way", "from", "to", "step", "count"))
-        if way != "values":
+        if way != "values" and any(texts):
             first, last, step = (text or "?" for text in texts)
-            number = int(count) if way in ("linspace", "geomspace") and count.isdecimal() else None
+            counted = way in ("linspace", "geomspace") and count.isdecimal() and len(count) <= _COUNT_DIGITS
+            number = int(count) if counted else None
             found[f"{row}/values"] = TypedRange(
                 first, last, step if way == "range" else "", number, _SPACINGS.get(way, "even")
             ).text

@@ -63,8 +63,9 @@ class Filled:
         self.doubts += doubtful(items, entries, [f"{self.at}/{name}"] * len(items), self.text("path"))
         return entries
 
-    def ranged(self, names: Sequence[str] = ("from", "to")) -> dict[str, Any]:
+    def ranged(self) -> dict[str, Any]:
         """The ends of a range by the names of their fields."""
+        names = ("from", "to")
         return dict(zip(names, self.together([self.text(name) for name in names], names), strict=True))
 
     def together(self, texts: Sequence[str], names: Sequence[str]) -> list[Any]:

@@ -122,6 +122,21 @@ def test_a_number_that_varies_no_longer_has_the_first_of_its_values() -> None:
     assert (values["axes"], values["/base/shaft/load"]) == ("0", "0.1 N*m")
 
 
+@pytest.mark.parametrize("row", ["/axes/0/way", "/axes/0/count"])
+def test_a_blank_row_of_an_older_page_stays_blank(row: str) -> None:
+    values = DRIVE | {"axes": "1", "/axes/0/way": "linspace", row: "9" * 5000 if row.endswith("count") else "linspace"}
+    settle(values)
+    spec, faults = spec_of(values)
+    assert (spec["axes"], faults) == ([], {})
+
+
+def test_a_count_without_end_is_none() -> None:
+    row = {"way": "linspace", "from": "1", "to": "2", "count": "9" * 5000}
+    values = {f"/axes/0/{name}": text for name, text in row.items()}
+    settle(values)
+    assert values["/axes/0/values"] == "1 to 2"
+
+
 @pytest.mark.parametrize(
     ("old", "text"),
     [
