@@ -12,7 +12,7 @@ import numpy as np
 from sprag_study.sentences import Amount
 from sprag_study.service.reading.reader import Phrase, joined, plural, term
 from sprag_study.worker.arrays import Bools, Floats, Ints
-from sprag_study.worker.models import REGIME_SENTENCES
+from sprag_study.worker.models import REGIME_SENTENCES, flags_of
 
 if TYPE_CHECKING:
     from sprag_study.worker.models import ResultInfo
@@ -60,6 +60,11 @@ def motion_sentence(regime: str, order: int | None) -> Phrase:
         "The motion repeats after {count} excitation periods, and disturbances of it die away.",
         order,
     )
+
+
+def without_orbit(regime: str, model: str) -> tuple[Phrase, ...]:
+    """The description of a motion that has no orbit; nothing of another one."""
+    return (motion_sentence(regime, None),) if regime in flags_of(model) else ()
 
 
 def coasting_sentence(results: Mapping[str, object]) -> Phrase | None:

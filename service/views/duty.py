@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from sprag_study.sentences import Amount, Sentence
+from sprag_study.sentences import Amount
 from sprag_study.service.answers import filled
 from sprag_study.service.answers.results import ClutchDutyRow, DutyTables, TorqueCyclesRow
-from sprag_study.service.faults import choice_of, parameter_error
+from sprag_study.service.faults import choice_of
 from sprag_study.service.languages import _
-from sprag_study.service.reading.numbers import in_language
 from sprag_study.service.reading.reader import Phrase
-from sprag_study.service.reading.units import QuantityError, typed_value
+from sprag_study.service.results.regimes import without_orbit
+from sprag_study.service.views.amounts import Range, amount_of
 from sprag_study.service.views.case_questions import DUTY, DutyQuestion
 from sprag_study.service.views.case_view import CaseAnswer, CaseView, Said
 from sprag_study.service.views.engagements import Clutched, columns_csv, require_clutches
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from sprag_study.worker.models import ClutchDuty
     from sprag_study.worker.study import Study
 
-#: Largest exponent of a Wöhler curve.
-_STEEPEST: Final = 100.0
+#: Exponents of a Wöhler curve.
+_EXPONENTS: Final = Range("1", 0.0, 100.0, above=True)
 #: Most kinds of cycles that people are shown, and their columns.
 _SHOWN: Final = 100
 _CYCLES: Final = (
@@ -47,10 +47,8 @@ _BEARS: Final[dict[str, Column]] = {
     "slip_work_per_hour": Column(Phrase("Slip work (heat) per hour"), "J"),
 }
 
-_HOW: Final = Phrase(
-    "Cycles are counted by the rainflow method (ASTM E1049). The equivalent torque, reached from zero once in each "
-    "engagement, does the same damage."
-)
+_COUNTED: Final = Phrase("Cycles are counted by the rainflow method (ASTM E1049).")
+_EQUIVALENT: Final = Phrase("The equivalent torque, reached from zero once in each engagement, does the same damage.")
 
 
 class Chosen(NamedTuple):
@@ -73,8 +71,10 @@ class DutyView(Clutched, CaseView[DutyQuestion, Chosen, Duty]):
     def choose(self, study: Study, case: int, question: DutyQuestion) -> Chosen:
         """The table of a CSV file, and the exponent."""
         require_clutches(study)
+        text = question.exponent or ""
         return Chosen(
-            choice_of("table", question.table, choices_of(DutyQuestion, "table")), _exponent(question.exponent)
+            choice_of("table", question.table, choices_of(DutyQuestion, "table")),
+            amount_of("exponent", text, _EXPONENTS) if text.strip() else None,
         )
 
     def compute(self, study: Study, case: int, chosen: Chosen) -> Duty:
@@ -101,19 +101,29 @@ class DutyView(Clutched, CaseView[DutyQuestion, Chosen, Duty]):
         return f"{self.about.name}-{chosen.table}"
 
     def shown(self, answer: DutyAnswer) -> Shown:
-        """A sentence for each clutch, and the tables; or why there are none."""
-        duty = answer.result
+        """A sentence for each clutch, and the tables; or why there are none.
+
+        Where the motion has no orbit, that comes first. Equivalent torques are shown where an exponent is given.
+        """
+        duty, equivalent = answer.result, answer.chosen.exponent is not None
         if duty.ending != models.OK:
             return Shown((Phrase(models.ENDING_SENTENCES[duty.ending]),))
         if not any(row.torque_max for row in duty.rows):
             return Shown((Phrase("No clutch transmits torque."),))
-        bears = [[row.clutch + 1, *(getattr(row, name) for name in _BEARS)] for row in duty.rows]
+        columns = {name: column for name, column in _BEARS.items() if equivalent or name != "torque_equivalent"}
+        bears = [[row.clutch + 1, *(getattr(row, name) for name in columns)] for row in duty.rows]
         cycles = [[row.clutch + 1, row.range, row.mean, row.count, row.per_hour] for row in duty.cycles[:_SHOWN]]
         few = Phrase("The first {some} of {all}; the files contain all of them.", some=_SHOWN, all=len(duty.cycles))
         return Shown(
-            (*map(_said, duty.rows), _HOW, *([few] if len(duty.cycles) > _SHOWN else [])),
+            (
+                *without_orbit(duty.regime, answer.study.model),
+                *map(_said, duty.rows),
+                _COUNTED,
+                *([_EQUIVALENT] if equivalent else []),
+                *([few] if len(duty.cycles) > _SHOWN else []),
+            ),
             (ShownTable(_("Cycles of torque"), _CYCLES, cycles),),
-            (ShownTable(_("Clutches"), [Column(Phrase("Clutch")), *_BEARS.values()], bears),),
+            (ShownTable(_("Clutches"), [Column(Phrase("Clutch")), *columns.values()], bears),),
         )
 
     def said(self, answer: DutyAnswer) -> Said:
@@ -131,18 +141,3 @@ def _said(row: ClutchDuty) -> Phrase:
         engagements=Amount(row.engagements_per_hour),
         cycles=Amount(row.cycles_per_hour),
     )
-
-
-def _exponent(text: str | None) -> float | None:
-    """The exponent that was typed; None for none."""
-    if not text or not text.strip():
-        return None
-    text = in_language(text)
-    try:
-        value = typed_value(text, "1")
-    except QuantityError as error:
-        raise parameter_error("exponent", error.code, error.message, text, Sentence("a number")) from error
-    if not 0.0 < value <= _STEEPEST:
-        allowed = Sentence("above {low} to {high}", low=Amount(0.0), high=Amount(_STEEPEST))
-        raise parameter_error("exponent", "out-of-range", "is outside its range", text, allowed)
-    return value

@@ -13,7 +13,7 @@ from sprag_study.service.faults import FaultError, choice_of
 from sprag_study.service.figures.forces import body_label, forces_figure
 from sprag_study.service.languages import N_, _
 from sprag_study.service.reading.reader import Phrase, joined
-from sprag_study.service.results.regimes import motion_sentence
+from sprag_study.service.results.regimes import without_orbit
 from sprag_study.service.views.amounts import Range, amount_of
 from sprag_study.service.views.case_questions import FORCES, ForcesQuestion
 from sprag_study.service.views.case_view import CaseAnswer, CaseView, Said
@@ -107,7 +107,7 @@ class ForcesView(CaseView[ForcesQuestion, tuple[Bearing, int, str], Forces]):
             return trajectory_csv(made.motion)
         columns: dict[str, list[Any]] = {
             "result": [info.name for info in made.infos],
-            "value": [_number(made.results[info.name]) for info in made.infos],
+            "value": [made.results[info.name] for info in made.infos],
             "unit": [info.unit for info in made.infos],
             "meaning": [info.description for info in made.infos],
         }
@@ -137,8 +137,7 @@ class ForcesView(CaseView[ForcesQuestion, tuple[Bearing, int, str], Forces]):
         made = answer.result
         if made.ending != models.OK:
             return Shown((Phrase(models.ENDING_SENTENCES[made.ending]),))
-        irregular = made.regime in models.flags_of(answer.study.model)
-        return Shown([*([motion_sentence(made.regime, None)] if irregular else []), *_sentences(made)], _tables(made))
+        return Shown([*without_orbit(made.regime, answer.study.model), *_sentences(made)], _tables(made))
 
     def said(self, answer: ForcesAnswer) -> Said:
         """The results, or how the case ended."""
@@ -188,7 +187,7 @@ def _tables(made: Forces) -> tuple[ShownTable, ...]:
     springs: list[list[Cell]] = [
         [body_label(body), *(found[f"{body}.spring.{name}"] for name in _SPRING)] for body in bodies[1:]
     ]
-    named = [info for info in made.infos if info.name.startswith(("bearing.", "balance.")) and info.unit != "s"]
+    named = [info for info in made.infos if info.name.startswith("bearing.") and info.unit != "s"]
     return (
         ShownTable(
             _("Forces on the table"),

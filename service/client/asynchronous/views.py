@@ -276,12 +276,12 @@ class AsyncStudyViews(AsyncStudyPart):
         query = query_of({"start": start})
         return Engagements(cast("Any", await self._of_case(case, "/engagements", query)))
 
-    async def duty(self, case: int, *, exponent: str | None = None, start: int | None = None) -> Duty:
+    async def duty(self, case: int, *, exponent: Value | None = None, start: int | None = None) -> Duty:
         """Compute what the clutches of one case have to bear: cycles of torque, impacts, overrunning, slip.
 
         Parameters
         ----------
-        exponent : str, optional
+        exponent : float or str, optional
             Exponent of the Wöhler curve, for the equivalent torque.
         """
         query = query_of({"exponent": exponent, "start": start})
@@ -291,8 +291,8 @@ class AsyncStudyViews(AsyncStudyPart):
         self,
         case: int,
         *,
-        shaft_mass: str | None = None,
-        load_rating: str | None = None,
+        shaft_mass: Value | None = None,
+        load_rating: Value | None = None,
         bearing: str | None = None,
         share: Value | None = None,
         points: int | None = None,
@@ -303,9 +303,9 @@ class AsyncStudyViews(AsyncStudyPart):
 
         Parameters
         ----------
-        shaft_mass : str, optional
+        shaft_mass : float or str, optional
             Mass of the shaft and of what is fixed to it, kg or with a unit; by default 0.
-        load_rating : str, optional
+        load_rating : float or str, optional
             Basic dynamic load rating C of the bearing, N or with a unit; without it there is no rating life.
         bearing : str, optional
             Kind of the bearing, for the exponent of its life.

@@ -16,7 +16,7 @@ from sprag_study.service.views.studies import STUDY_VIEWS
 
 CLIENT: Final = Path(__file__).resolve().parents[3] / "service" / "client"
 #: What stands for a number or a text with a unit in the help of commands.
-QUANTITIES: Final = frozenset({"VALUE", "TIME", "ANGLE", "TORQUE", "FACTOR", "SHARE", "N"})
+QUANTITIES: Final = frozenset({"VALUE", "TIME", "ANGLE", "TORQUE", "FACTOR", "SHARE", "NUMBER", "MASS", "FORCE", "N"})
 #: Two settings that the client takes as one pair.
 ENDS: Final = ("_from", "_to")
 

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import csv
 import io
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from sprag_study.service.answers import results
 from sprag_study.service.client import Client
+from sprag_study.service.views.case_questions import DutyQuestion
+from sprag_study.service.views.case_view import see
+from sprag_study.service.views.duty import DutyView
 from sprag_study.worker import models
 from tests.service.conftest import API, PortalTransport, Service
 from tests.service.shapes import fits
@@ -102,3 +106,14 @@ def test_the_page_of_a_case_shows_the_tables(service: Service, one_case: str) ->
     for table in ("clutches", "cycles"):
         assert f"csv, {table}" in shown
     assert service.http.get(f"{own}?show=duty&exponent=steep").status_code == 422
+    plain = service.http.get(f"{own}?show=duty").text.partition('id="duty"')[2]
+    assert "rainflow method" in plain
+    assert "quivalent torque" not in plain.replace("for the equivalent torque", "")
+
+
+def test_a_motion_without_an_orbit_is_said_to_have_none(service: Service, one_case: str) -> None:
+    study, view = service.store.studies.study(one_case), DutyView()
+    answer = see(study, 4, view, view.choose(study, 4, DutyQuestion()), None)
+    irregular = replace(answer, result=replace(answer.result, regime="irregular"))
+    assert view.shown(irregular).sentences[0] == models.REGIME_SENTENCES["irregular"]
+    assert view.shown(irregular).sentences[1:] == view.shown(answer).sentences

@@ -113,6 +113,7 @@ def test_the_page_of_a_case_shows_them(service: Service, one_case: str) -> None:
     for title in ("Forces on the table", "Power of the vibration", "Springs", "Bearing of the shaft"):
         assert title in text
     assert "csv, forces over time" in text
+    assert "residual" not in text.partition('id="forces"')[2]
     text = service.http.get(f"{own}?show=forces&load_rating=12+kN", headers={"Accept-Language": "uk"}).text
     assert "Номінальний ресурс підшипника: " in text
 
