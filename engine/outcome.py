@@ -243,7 +243,8 @@ class ClutchDuty:
     windup_min, windup_max : float
         Range of its windup while it transmits torque, in rad.
     slip_work_per_hour : float
-        Work that its damping turns into heat in an hour, in J.
+        Work that it turns into heat in an hour, in J: by its damping, by its drag while it overruns, and the energy
+        of its spring where it opens wound up.
     cycles_per_hour : float
         Cycles of its torque by rainflow counting.
     torque_equivalent : float

@@ -9,7 +9,7 @@ from sprag_study.engine.outcome import ClutchDuty, Duty, Engagement, TorqueCycle
 from sprag_study.engine.vibration_drive.automaton import Clutch
 from sprag_study.engine.vibration_drive.engagements import engagements_of
 from sprag_study.engine.vibration_drive.examined import Examined
-from sprag_study.engine.vibration_drive.pieces import Pieces, extremes, largest, rates
+from sprag_study.engine.vibration_drive.pieces import Pieces, extremes, largest
 from sprag_study.engine.vibration_drive.rainflow_counts import Cycle, cycles, equivalent, spectrum
 
 Floats = NDArray[np.float64]
@@ -34,56 +34,45 @@ def duty_of(motion: Examined, exponent: float | None = None) -> Duty:
     engaged = engagements_of(motion)
     rows, every = [], []
     for clutch in range(part.states.shape[1]):
-        counted = cycles(_torques(part, clutch).tolist(), repeats=motion.turn > 0)
+        # Drag while a clutch overruns is no torque that it transmits.
+        transmits = part.states[:, clutch, np.newaxis] >= Clutch.ENGAGED
+        torque = np.where(transmits, part.torques[:, clutch], 0.0)
+        counted = cycles(extremes(torque)[1].tolist(), repeats=motion.turn > 0)
         own = [row for row in engaged if row.clutch == clutch]
-        rows.append(_row(motion, part, clutch, own, counted, exponent))
+        rows.append(_row(motion, part, clutch, own, torque, counted, exponent))
         every += [TorqueCycles(clutch, *each, each.number / hours) for each in spectrum(counted)]
     return Duty(motion.start, motion.end, motion.regime, tuple(rows), tuple(every), motion.ending)
 
 
 def _row(
-    motion: Examined, part: Pieces, clutch: int, engaged: list[Engagement], counted: list[Cycle],
+    motion: Examined, part: Pieces, clutch: int, engaged: list[Engagement], torque: Floats, counted: list[Cycle],
     exponent: float | None,
 ) -> ClutchDuty:  # fmt: skip
     hours = (motion.end - motion.start) / _HOUR
     begun = [row for row in engaged if not math.isnan(row.impact_speed)]
-    transmits = part.states[:, clutch] >= Clutch.ENGAGED
-    torque, windup = part.torques[transmits, clutch], part.windup(clutch)[transmits]
-    rate = rates(torque, part.length[transmits])
+    windup = part.windup(clutch)[part.states[:, clutch] >= Clutch.ENGAGED]
     free = part.states[:, clutch] == Clutch.FREE
     overrun = part.speed[free] - part.speeds[free, clutch]
-    peak = _most(torque)
+    peak = max((row.torque_max for row in engaged), default=0.0)
     return ClutchDuty(
         clutch,
         len(begun) / hours,
         peak,
-        max(_most(rate), _most(-rate)),
-        _jump(motion, part, clutch, peak),
+        max((row.torque_rate_max for row in engaged), default=0.0),
+        _jump(torque, peak, repeats=motion.turn > 0),
         max((row.impact_speed for row in begun), default=0.0),
-        _most(overrun),
+        float(np.max(largest(overrun), initial=0.0)),
         max(0.0, -float(np.max(largest(-windup)))) if len(windup) else 0.0,
-        _most(windup),
+        max((row.windup_max for row in engaged), default=0.0),
         float(motion.losses[clutch]) * _HOUR,
         sum(each.number for each in counted) / hours,
         math.nan if exponent is None else equivalent(counted, exponent, len(begun)),
     )
 
 
-def _most(series: Floats) -> float:
-    """Largest value of all series, at least 0."""
-    return float(np.max(largest(series), initial=0.0))
-
-
-def _torques(part: Pieces, clutch: int) -> Floats:
-    """Torques that a clutch transmits, with all peaks and valleys in order; drag while it overruns is none of them."""
-    transmits = part.states[:, clutch] >= Clutch.ENGAGED
-    return extremes(np.where(transmits[:, np.newaxis], part.torques[:, clutch], 0.0))[1]
-
-
-def _jump(motion: Examined, part: Pieces, clutch: int, peak: float) -> float:
+def _jump(torque: Floats, peak: float, *, repeats: bool) -> float:
     """Largest jump of the transmitted torque between steps; 0 where there is only rounding."""
-    series = np.where(part.states[:, clutch, np.newaxis] >= Clutch.ENGAGED, part.torques[:, clutch], 0.0)
-    before, after = np.sum(series, axis=1), series[:, 0]
-    jumps = np.abs(after - np.roll(before, 1))[0 if motion.turn else 1 :]
+    before, after = np.sum(torque, axis=1), torque[:, 0]
+    jumps = np.abs(after - np.roll(before, 1))[0 if repeats else 1 :]
     jump = float(np.max(jumps, initial=0.0))
     return jump if jump > _ROUNDING * peak else 0.0

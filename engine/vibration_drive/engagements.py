@@ -5,16 +5,14 @@ steps.
 """
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from sprag_study.engine.outcome import Engagement, Engagements, PeriodMeans
-from sprag_study.engine.run import Run, SettledRun
 from sprag_study.engine.vibration_drive.automaton import Clutch
-from sprag_study.engine.vibration_drive.examined import Examined, examined, examined_settled
+from sprag_study.engine.vibration_drive.examined import Examined
 from sprag_study.engine.vibration_drive.pieces import Pieces, integrals, largest, products, rates
 
 Floats = NDArray[np.float64]
@@ -30,54 +28,6 @@ class _Stretch:
     clutch: int
     first: int
     last: int
-
-
-def engagements(columns: Mapping[str, ArrayLike], run: Run) -> Engagements:
-    """The engagements in the window of a run, and the means of the run's periods.
-
-    Parameters
-    ----------
-    columns : mapping
-        As for ``simulate``, scalars only.
-    run : Run
-
-    Returns
-    -------
-    Engagements
-        For a run longer than ``MAX_PERIODS`` only the last periods; an engagement that the window cuts is given in
-        part.
-
-    Raises
-    ------
-    ValueError
-        If a required parameter is missing or the number of pendulums or coefficients is out of range.
-    """
-    return tables_of(examined(columns, run))
-
-
-def settled_engagements(
-    columns: Mapping[str, ArrayLike], settings: SettledRun, start: Floats | None = None
-) -> Engagements:
-    """The engagements in one turn of the settled motion, and the means of its periods.
-
-    Times count from the start of an excitation period. An engagement that continues into the next turn is given
-    completely and ends after the turn. For irregular or unsettled motion, the ``settings.max_period`` periods after the
-    search are examined.
-
-    Parameters
-    ----------
-    columns : mapping
-        As for ``simulate``, scalars only.
-    settings : SettledRun
-    start : array, shape (1, strobes.width(n)), optional
-        As ``starts`` of ``settle``; without it the case's own start.
-
-    Raises
-    ------
-    ValueError
-        If a required parameter is missing or the number of pendulums or coefficients is out of range.
-    """
-    return tables_of(examined_settled(columns, settings, start))
 
 
 def engagements_of(motion: Examined) -> list[Engagement]:

@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike, NDArray
 from sprag_study.engine.catalogue import ResultInfo
 from sprag_study.engine.endings import ENDINGS, Ending
 from sprag_study.engine.run import Run, SettledRun
-from sprag_study.engine.vibration_drive.automaton import Clutch
 from sprag_study.engine.vibration_drive.cases import Column, case_matrix, pendulum_count, unloaded, with_lengths
 from sprag_study.engine.vibration_drive.characteristics import characteristics
 from sprag_study.engine.vibration_drive.integration import integrate
@@ -86,16 +85,17 @@ def examined(columns: Mapping[str, ArrayLike], run: Run) -> Examined:
     last = run.duration.in_periods(frequency)
     start, end = run.window_in_periods(frequency)
     end = min(end, last)
-    since = max(0.0, last - MAX_PERIODS)
+    since = first_period(last)
     start = min(max(start, since), end)
     module = kernel_of(columns, run.tolerance)
     matrix = case_matrix(columns, run, 1)
-    ending, steps, sums = _recorded(module, matrix, run, since, last - since)
-    losses = _losses(result_infos(module.LAYOUT.n), characteristics(module.LAYOUT, matrix, sums)[0])
+    record = read_steps(module, matrix, run, since, last - since)
+    steps = record.steps.wound(record.of_pendulums(PendulumSample.WINDUP))
+    losses = _losses(result_infos(module.LAYOUT.n), characteristics(module.LAYOUT, matrix, record.sums)[0])
     period = 1.0 / frequency
-    ok = ending == Ending.OK
+    ok = record.ending == Ending.OK
     return Examined(
-        start * period, end * period, "", ending, period, 0, since, last, steps if ok else None,
+        start * period, end * period, "", record.ending, period, 0, since, last, steps if ok else None,
         steps.between(start, end) if ok else None, losses,
     )  # fmt: skip
 
@@ -132,9 +132,10 @@ def examined_settled(columns: Mapping[str, ArrayLike], settings: SettledRun, sta
     begin, length = float(settled.points[0, BEGIN]), float(2 * turn or periods)
     matrix = with_lengths(case_matrix(columns, run, 1), np.array([begin]), np.array([length]), windowed=False)
     module = kernel_of(columns, settings.tolerance)
-    ending, steps = read_steps(module, matrix, run, 0.0, length + 1.0, starts=settled.points)
-    if ending != Ending.OK:
-        return replace(nothing, ending=ending)
+    record = read_steps(module, matrix, run, 0.0, length + 1.0, starts=settled.points)
+    if record.ending != Ending.OK:
+        return replace(nothing, ending=record.ending)
+    steps = record.steps.wound(settled.points[0, SHAFT_WIDTH + WINDUP :: PENDULUM_WIDTH])
     if turn:
         part = steps.between(begin, begin + turn)
         return Examined(0.0, turn * period, name, ending, period, turn, begin, begin + length, steps, part, losses)
@@ -142,39 +143,51 @@ def examined_settled(columns: Mapping[str, ArrayLike], settings: SettledRun, sta
     return Examined(begin * period, end, name, ending, period, 0, begin, begin + length, steps, steps, losses)
 
 
+def first_period(last: float) -> float:
+    """The first excitation period that is examined of a run of ``last`` periods."""
+    return max(0.0, float(np.ceil(last)) - MAX_PERIODS)
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """A run of one case, by its steps from a time on.
+
+    Attributes
+    ----------
+    ending : Ending
+    steps : Pieces
+        Windups of clutches that are wound up at the first step count from there.
+    sums : array, shape (1, columns)
+        Of the whole run.
+    sample : array, shape (columns,)
+        Instantaneous values at that time.
+    """
+
+    ending: Ending
+    steps: Pieces
+    sums: Floats
+    sample: Floats
+
+    def of_pendulums(self, column: PendulumSample) -> Floats:
+        """One of the instantaneous values of each pendulum, shape (n,)."""
+        n = self.steps.states.shape[1]
+        return np.array([self.sample[pendulum_samples(i)][column] for i in range(n)])
+
+
 def read_steps(
     module: Kernel, matrix: Floats, run: Run, since: float, periods: float, starts: Floats | None = None
-) -> tuple[Ending, Pieces]:
-    """How the one case of a matrix ends, and its steps from the time ``since`` on (in excitation periods).
+) -> Record:
+    """The run of the one case of a matrix, by its steps from the time ``since`` on (in excitation periods).
 
     With ``starts`` the run begins there, and so do its steps.
     """
-    ending, steps, _ = _recorded(module, matrix, run, since, periods, starts)
-    return ending, steps
-
-
-def _recorded(
-    module: Kernel, matrix: Floats, run: Run, since: float, periods: float, starts: Floats | None = None
-) -> tuple[Ending, Pieces, Floats]:
-    """As ``read_steps``, with the sums of the run."""
     room = int(_STEPS * (periods + 2.0))
     while True:
-        done = integrate(module, matrix, run, starts=starts, pieces=room, since=since)
+        done = integrate(module, matrix, run, starts=starts, times=np.array([since]), pieces=room, since=since)
         if np.isnan(done.pieces[-1, 0]):
-            ending = ENDINGS[int(done.sums[0, OUT_ENDING])]
-            pieces = Pieces.read(module.LAYOUT, done.pieces, float(matrix[0, Column.PERIOD]))
-            return ending, _wound(pieces, module, matrix, run, starts), done.sums
+            steps = Pieces.read(module.LAYOUT, done.pieces, float(matrix[0, Column.PERIOD]))
+            return Record(ENDINGS[int(done.sums[0, OUT_ENDING])], steps, done.sums, done.samples[0])
         room *= 2
-
-
-def _wound(pieces: Pieces, module: Kernel, matrix: Floats, run: Run, starts: Floats | None) -> Pieces:
-    """The steps with the windups of the clutches that are wound up when they begin."""
-    if not len(pieces.length) or not np.any(pieces.states[0] >= Clutch.ENGAGED):
-        return pieces
-    if starts is not None:
-        return pieces.wound(starts[0, SHAFT_WIDTH + WINDUP :: PENDULUM_WIDTH])
-    sample = integrate(module, matrix, run, times=pieces.start[:1]).samples[0]
-    return pieces.wound([sample[pendulum_samples(i)][PendulumSample.WINDUP] for i in range(module.LAYOUT.n)])
 
 
 def _losses(infos: tuple[ResultInfo, ...], values: Floats) -> Floats:

@@ -18,12 +18,11 @@ from sprag_study.engine.outcome import Forces, Trajectory
 from sprag_study.engine.quadrature import gauss
 from sprag_study.engine.run import Run, SettledRun
 from sprag_study.engine.vibration_drive.cases import case_matrix, default_of, scalars, with_lengths
-from sprag_study.engine.vibration_drive.examined import MAX_PERIODS, read_steps
+from sprag_study.engine.vibration_drive.examined import first_period, read_steps
 from sprag_study.engine.vibration_drive.force_results import Bearing, force_infos
 from sprag_study.engine.vibration_drive.formulas import base_series, drive, free_acceleration
-from sprag_study.engine.vibration_drive.integration import integrate
-from sprag_study.engine.vibration_drive.kernel import Kernel, kernel_of
-from sprag_study.engine.vibration_drive.layout import PendulumSample, pendulum_samples
+from sprag_study.engine.vibration_drive.kernel import kernel_of
+from sprag_study.engine.vibration_drive.layout import PendulumSample
 from sprag_study.engine.vibration_drive.pieces import Pieces
 from sprag_study.engine.vibration_drive.regimes import Regime
 from sprag_study.engine.vibration_drive.settle import settle
@@ -64,7 +63,7 @@ def forces(columns: Mapping[str, ArrayLike], run: Run, bearing: Bearing, points:
     last = run.duration.in_periods(frequency)
     start, end = run.window_in_periods(frequency)
     end = min(end, last)
-    start = min(max(start, float(np.ceil(last)) - MAX_PERIODS), end)
+    start = min(max(start, first_period(last)), end)
     since = float(np.floor(start))
     matrix = case_matrix(values, run, 1)
     return _forces(values, run, matrix, None, (since, start, end), bearing, points, "")
@@ -119,11 +118,11 @@ def _forces(
     """
     since, start, end = span
     module = kernel_of(values, run.tolerance)
-    ending, pieces = read_steps(module, matrix, run, since, end - since, starts=starts)
-    if ending is not Ending.OK:
-        return _nothing(ending, regime)
-    angles = _angles_at(module, matrix, run, since, starts)
-    machine = _Motion.read(values, pieces.between(since, end), angles, bearing.shaft_mass).after(start)
+    record = read_steps(module, matrix, run, since, end - since, starts=starts)
+    if record.ending is not Ending.OK:
+        return _nothing(record.ending, regime)
+    angles = record.of_pendulums(PendulumSample.ANGLE)
+    machine = _Motion.read(values, record.steps.between(since, end), angles, bearing.shaft_mass).after(start)
     period = 1.0 / values["excitation.frequency"]
     # Times of a turn count from the start of an excitation period.
     zero = start if starts is not None else 0.0
@@ -132,14 +131,8 @@ def _forces(
     return Forces(
         (start - zero) * period, (end - zero) * period, regime, infos,
         {info.name: results[info.name] for info in infos},
-        _sampled(machine, np.linspace(start, end, points), zero, period), ending,
+        _sampled(machine, np.linspace(start, end, points), zero, period), record.ending,
     )  # fmt: skip
-
-
-def _angles_at(module: Kernel, matrix: Floats, run: Run, time: float, starts: Floats | None) -> Floats:
-    """Angles of the pendulums at a time in excitation periods."""
-    sample = integrate(module, matrix, run, starts=starts, times=np.array([time])).samples[0]
-    return np.array([sample[pendulum_samples(i)][PendulumSample.ANGLE] for i in range(module.LAYOUT.n)])
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from sprag_study.engine import elementary
 
 #: Part of the largest range below which ranges are rounding.
 _ROUNDING = 1e-6
-#: Part of the largest range within which cycles are alike.
+#: Part of the largest range to which ranges and means are rounded where cycles are compared.
 _ALIKE = 1e-3
 
 
@@ -37,14 +37,16 @@ def cycles(history: Sequence[float], *, repeats: bool) -> list[Cycle]:
     if repeats and values:
         top = values.index(max(values))
         values = [*values[top:], *values[: top + 1]]
+    # The package finds no turning points in two values; the last one twice changes nothing else.
+    values += values[-1:]
     counted = [Cycle(*each) for *each, _, _ in rainflow.extract_cycles(values)]
     least = _ROUNDING * max((cycle.size for cycle in counted), default=0.0)
     return [cycle for cycle in counted if cycle.size > least]
 
 
 def spectrum(counted: Sequence[Cycle]) -> list[Cycle]:
-    """Cycles whose ranges and means agree to a thousandth of the largest range as one, with the means of both; the
-    largest ranges first.
+    """Cycles whose ranges and means are the same when rounded to a thousandth of the largest range as one, with the
+    means of both; the largest ranges first.
     """
     unit = _ALIKE * max((cycle.size for cycle in counted), default=0.0)
     alike: dict[tuple[int, int], list[Cycle]] = {}

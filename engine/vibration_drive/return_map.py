@@ -108,8 +108,8 @@ class DriveMap:
     def _turn(self, row: Floats, parameter: float) -> Pieces | None:
         matrix = case_matrix(self.machines(np.array([parameter])), self.run, 1)
         matrix = with_lengths(matrix, row[None, BEGIN], np.array([float(self.order)]), windowed=False)
-        ending, pieces = read_steps(self.kernel, matrix, self.run, 0.0, self.order + 1.0, starts=row[None])
-        return pieces if ending == Ending.OK else None
+        record = read_steps(self.kernel, matrix, self.run, 0.0, self.order + 1.0, starts=row[None])
+        return record.steps if record.ending == Ending.OK else None
 
     def pattern(self, point: Floats, parameter: float) -> Pattern:
         """The states that the shaft and each clutch go through in one turn."""

@@ -361,7 +361,13 @@ class ClutchDutyRow(TypedDict):
     overrunning_speed_max: Annotated[float, Doc("largest relative speed at which it overruns, rad/s")]
     windup_min: Annotated[float, Doc("smallest windup while it transmits torque, rad")]
     windup_max: Annotated[float, Doc("largest windup, rad")]
-    slip_work_per_hour: Annotated[float, Doc("work that its damping turns into heat in an hour, J")]
+    slip_work_per_hour: Annotated[
+        float,
+        Doc(
+            "work that it turns into heat in an hour, J: by its damping, by its drag while it overruns, and the energy "
+            "of its spring where it opens wound up"
+        ),
+    ]
     cycles_per_hour: Annotated[float, Doc("cycles of its torque by rainflow counting")]
     torque_equivalent: Annotated[
         float | None,

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from benchmarks.workloads import W1
 from sprag_study.engine.endings import ENDINGS, Ending
 from sprag_study.engine.run import SettledRun
-from sprag_study.engine.vibration_drive.engagements import settled_engagements
+from sprag_study.engine.vibration_drive.engagements import tables_of
+from sprag_study.engine.vibration_drive.examined import examined_settled
 from sprag_study.engine.vibration_drive.portrait import settled_portrait
 from sprag_study.engine.vibration_drive.regimes import Regime, settled_infos
 from sprag_study.engine.vibration_drive.settle import SettledBatch, settle
@@ -120,7 +121,7 @@ def test_motion_engagements_and_portrait_of_a_start_are_those_of_its_row() -> No
     angle = turned.values[:, turned.names.index("shaft.angle")]
     assert (angle[2] - angle[1]) / (200.0 * period) == pytest.approx(0.5579460807, rel=1e-6)
     assert turned.values[0, turned.names.index("shaft.speed")] == pytest.approx(start[0, SHAFT_SPEED], abs=1e-12)
-    means = settled_engagements(own, settings, start).periods
+    means = tables_of(examined_settled(own, settings, start)).periods
     assert np.mean([mean.speed_mean for mean in means]) == pytest.approx(0.5579460807, abs=1e-7)
     portrait = settled_portrait(own, settings, start)
     assert portrait.order == found.batch.values[1, NAMES.index("regime.order")]

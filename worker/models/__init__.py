@@ -21,7 +21,6 @@ from sprag_study.engine.outcome import (
     Engagement,
     Engagements,
     Portrait,
-    TorqueCycles,
     Trajectory,
 )
 from sprag_study.engine.problems import MachineError
@@ -143,7 +142,6 @@ __all__ = [
     "Share",
     "Span",
     "TableError",
-    "TorqueCycles",
     "Trajectory",
     "WorkerEnding",
     "cache_folder",

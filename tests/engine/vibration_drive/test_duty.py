@@ -15,7 +15,7 @@ from sprag_study.engine.endings import Ending
 from sprag_study.engine.outcome import Duty
 from sprag_study.engine.run import SettledRun
 from sprag_study.engine.vibration_drive.duty import duty_of
-from sprag_study.engine.vibration_drive.engagements import engagements
+from sprag_study.engine.vibration_drive.engagements import tables_of
 from sprag_study.engine.vibration_drive.examined import Examined, examined, examined_settled
 from sprag_study.engine.vibration_drive.pieces import extremes
 from sprag_study.engine.vibration_drive.rainflow_counts import Cycle, cycles, equivalent, spectrum
@@ -91,6 +91,12 @@ def test_turning_points_between_and_on_the_points_of_a_step() -> None:
     assert values[7:-1] == pytest.approx([2.0 * x - 4.5 * x**2 + (3.0 - 1e-3) * x**3 for x in inner])
 
 
+def test_a_load_that_only_rises_has_half_a_cycle() -> None:
+    assert cycles([0.0, 5.0], repeats=False) == [Cycle(5.0, 2.5, 0.5)]
+    assert counts([0.0, 5.0], repeats=True) == {5.0: 1.0}
+    assert cycles([0.0, 2.0, 5.0, 5.0], repeats=False) == [Cycle(5.0, 2.5, 0.5)]
+
+
 def test_the_equivalent_range() -> None:
     counted = [Cycle(4.0, 2.0, 1.0), Cycle(2.0, 1.0, 8.0)]
     assert equivalent(counted, 3.0, 1.0) == pytest.approx(128.0 ** (1.0 / 3.0))
@@ -102,7 +108,8 @@ def test_the_equivalent_range() -> None:
 @pytest.mark.parametrize("columns", [drive(1), TWO, LOCKING, DAMPED], ids=["one", "two", "locking", "damped"])
 def test_the_duty_of_a_window_is_that_of_its_results(columns: Columns) -> None:
     run = periods(24, 14, 24)
-    duty, row, table = duty_of(examined(columns, run), 4.0), one(columns, run), engagements(columns, run)
+    motion, row = examined(columns, run), one(columns, run)
+    duty, table = duty_of(motion, 4.0), tables_of(motion)
     hours = 10.0 / columns["excitation.frequency"] / 3600.0
     assert (duty.ending, duty.start, duty.end) == (Ending.OK, table.start, table.end)
     for number, bears in enumerate(duty.rows):

@@ -12,8 +12,8 @@ from benchmarks.workloads import W1
 from sprag_study.engine.endings import Ending
 from sprag_study.engine.outcome import Engagement, Engagements
 from sprag_study.engine.run import Reset, SettledRun
-from sprag_study.engine.vibration_drive.engagements import engagements, settled_engagements
-from sprag_study.engine.vibration_drive.examined import MAX_PERIODS
+from sprag_study.engine.vibration_drive.engagements import tables_of
+from sprag_study.engine.vibration_drive.examined import MAX_PERIODS, examined, examined_settled
 from sprag_study.engine.vibration_drive.regimes import settled_infos
 from sprag_study.engine.vibration_drive.settle import settle
 from sprag_study.engine.vibration_drive.simulate import trajectory
@@ -29,7 +29,8 @@ def settled(columns: Columns, **settings: Any) -> tuple[Engagements, dict[str, f
     """The table of a settled case, and its results."""
     run = SettledRun(**settings)
     names = [info.name for info in settled_infos(1)]
-    return settled_engagements(columns, run), dict(zip(names, settle(columns, run, cases=1).values[0], strict=True))
+    row = dict(zip(names, settle(columns, run, cases=1).values[0], strict=True))
+    return tables_of(examined_settled(columns, run)), row
 
 
 def w1(frequency: float, amplitude: float, load: float, **changes: float) -> Columns:
@@ -49,7 +50,7 @@ def w1(frequency: float, amplitude: float, load: float, **changes: float) -> Col
 @pytest.mark.parametrize("columns", [drive(1), TWO, LITERAL, LOCKING], ids=["one", "two", "no backlash", "locking"])
 def test_counts_torques_work_and_times_are_those_of_the_results(columns: Columns, reset: Reset) -> None:
     run = periods(24, 14, 24, reset=reset)
-    table, row = engagements(columns, run), one(columns, run)
+    table, row = tables_of(examined(columns, run)), one(columns, run)
     length = 10.0 / columns["excitation.frequency"]
     assert table.ending is Ending.OK
     assert (table.start, table.end) == pytest.approx((14.0 / 20.0, 24.0 / 20.0))
@@ -68,7 +69,7 @@ def test_counts_torques_work_and_times_are_those_of_the_results(columns: Columns
 
 def test_work_that_a_literal_reset_loses_is_the_difference_of_both_works() -> None:
     run = periods(24, 14, 24, reset="literal")
-    table, row = engagements(LITERAL, run), one(LITERAL, run)
+    table, row = tables_of(examined(LITERAL, run)), one(LITERAL, run)
     assert all(found.complete for found in table.rows[1:-1])
     lost = sum(found.work_pendulum - found.work_shaft for found in table.rows)
     stored = row["power.stored.mean"]
@@ -78,7 +79,7 @@ def test_work_that_a_literal_reset_loses_is_the_difference_of_both_works() -> No
 
 def test_periods_are_those_of_the_whole_run() -> None:
     run = periods(24, 14, 24)
-    table, row = engagements(drive(1), run), one(drive(1), run)
+    table, row = tables_of(examined(drive(1), run)), one(drive(1), run)
     assert [found.start * 20.0 for found in table.periods] == pytest.approx(list(range(24)))
     window = table.periods[14:]
     assert np.mean([found.speed_mean for found in window]) == pytest.approx(row["shaft.speed.mean"], rel=1e-12)
@@ -88,10 +89,10 @@ def test_periods_are_those_of_the_whole_run() -> None:
 
 
 def test_a_window_cuts_the_engagements_at_its_ends() -> None:
-    table = engagements(drive(1), periods(24, 14, 24))
+    table = tables_of(examined(drive(1), periods(24, 14, 24)))
     first = next(found for found in table.rows if found.complete)
     cut = 0.5 * (first.start + first.end) * 20.0
-    halves = [engagements(drive(1), periods(24, *window)).rows for window in ((14, cut), (cut, 24))]
+    halves = [tables_of(examined(drive(1), periods(24, *window))).rows for window in ((14, cut), (cut, 24))]
     left, right = halves[0][-1], halves[1][0]
     assert (left.complete, right.complete) == (False, False)
     assert left.end == pytest.approx(cut / 20.0, rel=1e-12)
@@ -100,15 +101,22 @@ def test_a_window_cuts_the_engagements_at_its_ends() -> None:
 
 
 def test_of_a_long_run_the_last_periods_are_told() -> None:
-    table = engagements(drive(1), periods(MAX_PERIODS + 20, 0, MAX_PERIODS + 20))
+    table = tables_of(examined(drive(1), periods(MAX_PERIODS + 20, 0, MAX_PERIODS + 20)))
     assert len(table.periods) == MAX_PERIODS
     assert table.start * 20.0 == pytest.approx(20.0)
     assert table.rows[0].start >= table.start
 
 
+def test_of_a_longer_run_the_part_begins_with_a_period() -> None:
+    motion = examined(drive(1), periods(MAX_PERIODS + 20.5, 0, MAX_PERIODS + 20.5))
+    assert motion.part is not None
+    assert motion.start == pytest.approx(21 * motion.period)
+    assert (motion.part.start[0], motion.part.end[-1]) == pytest.approx((21.0, MAX_PERIODS + 20.5))
+
+
 def test_an_engagement_is_that_of_an_independent_integration() -> None:
     columns, run = drive(1), periods(24, 14, 24)
-    found = engagements(columns, run).rows[3]
+    found = tables_of(examined(columns, run)).rows[3]
     at = trajectory(columns, run, [found.start])
     names = ("pendulums.0.angle", "pendulums.0.speed", "shaft.speed")
     end, torque, work = _by_scipy(columns, found, [float(column(at, name)[0]) for name in names])
@@ -215,5 +223,5 @@ def test_an_irregular_motion_is_told_over_the_largest_order() -> None:
 
 def test_a_case_that_does_not_end_ok_has_no_rows() -> None:
     run = periods(24, 14, 24, max_steps=50)
-    table = engagements(drive(1), run)
+    table = tables_of(examined(drive(1), run))
     assert (table.ending, table.rows, table.periods) == (Ending.STEP_BUDGET, (), ())
