@@ -72,7 +72,7 @@ def users(context: typer.Context) -> list[tuple[str, str]]:
     from sprag_study.service.cli.stores import asks_service
 
     with _typed(context):
-        asks = asks_service(context.params.get("db"))
+        asks = context.params.get("db") is None and asks_service(None)
     if not asks:
         return stored_users(context)
     return _asked(context, lambda client: [(user["name"], user["role"]) for user in client.users()])

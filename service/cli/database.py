@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sprag_study.service.cli.common import wants_json
-from sprag_study.service.cli.configured import read_settings
 from sprag_study.service.cli.console import ExitCode, TroubleError, WrongInputError, say, write_json
 from sprag_study.service.cli.groups import Groups
 from sprag_study.service.cli.options import Database
@@ -40,7 +39,7 @@ def upgrade(
     from sprag_study.service.jobs.dispatching import owner_name
     from sprag_study.service.storage.alone import upgrade as bring_up
 
-    done = bring_up(read_settings(database=db).database_url, owner_name(), copy=not no_backup)
+    done = bring_up(database_of(db, create=True), owner_name(), copy=not no_backup)
     where = {"database": done.location}
     if wants_json():
         copy = None if done.backup is None else str(done.backup)
@@ -174,7 +173,7 @@ def _opened(db: str | None, *, create: bool = False) -> Iterator[Session]:
     """Connections to the database, which is there; where it may be created, its folder is."""
     from sprag_study.service.storage.database.session import Session, file_of
 
-    location = read_settings(database=db).database_url if create else database_of(db)
+    location = database_of(db, create=create)
     file = file_of(location)
     if file is not None and not (folder := file.absolute().parent).is_dir():
         raise WrongInputError("invalid-file", _("{file}: there is no folder {folder}", file=file, folder=folder))

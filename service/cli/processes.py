@@ -72,8 +72,8 @@ def worker(
     from sprag_study.service import logs
     from sprag_study.service.jobs.dispatching import run_dispatcher, stop_on_signals, worker_settings
 
-    settings = read_settings(database=db)
     database_of(db)
+    settings = read_settings(database=db)
     logs.configure(settings.log_format, requests=False)
     with languages.language(languages.ENGLISH):
         run_dispatcher(worker_settings(settings), stop_on_signals(), take_over=take_over)

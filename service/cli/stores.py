@@ -7,10 +7,11 @@ import os
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from sprag_study.service.cli.common import names_service, wants_json
+from sprag_study.service.cli.common import CURRENT, names_service, wants_json
 from sprag_study.service.cli.configured import read_settings
-from sprag_study.service.cli.console import WrongInputError, say
-from sprag_study.service.languages import _
+from sprag_study.service.cli.console import WrongInputError, say, wrong_option
+from sprag_study.service.cli.sources import refuse_here
+from sprag_study.service.languages import N_, _
 from sprag_study.service.login import profile
 
 if TYPE_CHECKING:
@@ -19,11 +20,20 @@ if TYPE_CHECKING:
     from sprag_study.service.storage.store import Store
 
 
-def database_of(db: str | None) -> str:
-    """The URL of a database that is there: that of ``db`` (the option), or of the settings.
+def database_of(db: str | None, *, create: bool = False) -> str:
+    """The URL of the database of a command that works on one: that of ``db`` (the option), or of the settings.
 
-    Raises WrongInputError for a file that does not exist.
+    Raises WrongInputError where ``--server`` names a service, and unless it is created, for a file that does not exist.
     """
+    if names_service():
+        refuse_here(db=db)
+        reason = N_("this command works on a database on its host: run it there, without --server")
+        raise wrong_option("--server", "not-used", reason, CURRENT.get().server)
+    return read_settings(database=db).database_url if create else _present(db)
+
+
+def _present(db: str | None) -> str:
+    """The URL of a database that is there; errors as of `database_of`."""
     from sprag_study.service.storage.database.session import file_of
 
     url = read_settings(database=db).database_url
@@ -41,11 +51,12 @@ def asks_service(db: str | None) -> bool:
     """Whether a command of administrators asks the service, and not a database.
 
     It does with ``--server``, and on a machine without a database where ``SPRAG_SERVER`` or a login names a service;
-    never with ``db`` (the option).
+    never with ``db`` (the option). Raises WrongInputError for both options.
     """
-    if db is not None or names_service():
-        return db is None
-    return bool(os.environ.get("SPRAG_SERVER") or "server" in profile()) and not _is_here()
+    if names_service():
+        refuse_here(db=db)
+        return True
+    return db is None and bool(os.environ.get("SPRAG_SERVER") or "server" in profile()) and not _is_here()
 
 
 def _is_here() -> bool:
@@ -60,16 +71,21 @@ def _is_here() -> bool:
 
 
 def store_of(db: str | None) -> Store:
-    """The store of that database; raises DatabaseError for an empty one. Close it at the end."""
+    """The store of the database of `database_of`; raises DatabaseError for an empty one. Close it at the end."""
     from sprag_study.service.storage.store import Store
 
     return Store.open(database_of(db), create=False)
 
 
 def require_store(db: str | None) -> None:
-    """Refuse a database that is not there, or is empty, where a command has one (``db``); errors as of `store_of`."""
+    """Refuse a database that is not there, or is empty, where a study of a spec is kept in one (``db``).
+
+    Errors as of `store_of`, except that ``--server`` may be given: what runs here does not ask it.
+    """
+    from sprag_study.service.storage.store import Store
+
     if db is not None:
-        store_of(db).close()
+        Store.open(_present(db), create=False).close()
 
 
 @contextmanager

@@ -145,10 +145,30 @@ def test_health_and_metrics_of_a_service(asked: Run, office: Office, monkeypatch
     assert (ill.code, "The worker has ended." in ill.err) == (3, True)
 
 
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        *(
+            (words, "--server: this command works on a database on its host")
+            for words in ("token list", "token create --name x", "db backup FILE", "db check", "db upgrade", "worker")
+        ),
+        *(
+            (f"{words} --db kept.sqlite3", "--db: belongs to this machine, and --server names a service")
+            for words in ("audit", "user list", "token list", "db move FILE")
+        ),
+    ],
+)
+def test_a_service_is_never_left_unasked_silently(asked: Run, office: Office, words: str, why: str) -> None:
+    assert office.app is not None
+    done = asked("admin", *words.split())
+    assert (done.code, done.out) == (2, "")
+    assert why in done.err
+
+
 def test_the_service_is_asked_where_one_is_chosen(
     sprag: Run, office: Office, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """By an option, or by the environment or a login on a machine without a database; never with --db."""
+    """By an option, or by the environment or a login on a machine without a database; not with --db."""
 
     def place(*options: str) -> str:
         done = sprag("admin", "user", "list", "--json", *options)
@@ -163,11 +183,12 @@ def test_the_service_is_asked_where_one_is_chosen(
     monkeypatch.setenv("SPRAG_SERVER", SERVER)
     assert place() == "database", "a variable of the host of the service"
     assert place("--server", SERVER) == "server"
-    assert place("--server", SERVER, "--db", office.store.session.location) == "database"
+    assert place("--db", office.store.session.location) == "database"
     monkeypatch.setenv("SPRAG_DATABASE", str(tmp_path / "none.sqlite3"))
     assert place() == "server"
     monkeypatch.delenv("SPRAG_SERVER")
     assert place() == "server"
+    assert place("--db", office.store.session.location) == "database"
     assert "service http://localhost:" in sprag("admin", "user", "list").err
     assert sprag("logout").code == 0
     nothing = sprag("admin", "user", "list")

@@ -29,7 +29,10 @@ CREATORS = {"serve", "run", "admin db upgrade"}
 SILENT = {"check", "show state", "admin doctor"}
 #: Arguments of the commands of `OTHERS`.
 ARGUMENTS = {"admin db backup": "copy.sqlite3", "admin db move": "target.sqlite3", "check": "SPEC"} | {
-    **{f"show {name}": "SPEC" for name in ("front", "ribbon", "state")},
+    **dict.fromkeys(
+        ("export", "show case", "show cases", "show front", "show ribbon", "show rounds", "show state"), "SPEC"
+    ),
+    "compare": "SPEC SPEC",
     "show sql": "SPEC select(1)",
     "show map": "SPEC --x a --y b --z c",
     "show sensitivity": "SPEC --y c",
