@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import Annotated
 
@@ -74,13 +75,15 @@ def compare(
         sources = [stack.enter_context(opened(text, db=None if is_study(text) else db)) for text in studies]
         named = [Study(source, study_id) for source, study_id in sources]
         found = side_by_side(named, x, y or (), by=by or (), at=held)
-    curves = [(name, drawn.data) for name, drawn in zip(found.names, found.curves, strict=False)]
+    ids = [study_id for _, study_id in sources]
+    names = list(found.names) if db is not None else _by_file(found.names, studies, ids)
+    curves = [(name, drawn.data) for name, drawn in zip(names, found.curves, strict=False)]
     if wants_json():
-        write_json({"studies": list(found.names), "inputs": found.inputs, "curves": dict(curves)})
+        write_json({"studies": names, "inputs": found.inputs, "curves": dict(curves)})
         return
     rows = [(pointer, *map(_text, values)) for pointer, values in found.inputs.items()]
     with table_words():
-        columns: list[Column] = [(_("input"), False, True), *((name, False) for name in found.names)]
+        columns: list[Column] = [(_("input"), False, True), *((name, False) for name in names)]
         if rows or piped():
             show_table(_("inputs that differ"), columns, rows)
         if piped() and curves:
@@ -93,6 +96,16 @@ def compare(
     if not piped():
         for name, drawn in curves:
             show_curves(drawn, name)
+
+
+def _by_file(names: Sequence[str], studies: Sequence[str], ids: Sequence[str]) -> list[str]:
+    """The names with the file of a spec for the id of its study, which is gone when the command ends."""
+    shown = []
+    for place, (name, text, study_id) in enumerate(zip(names, studies, ids, strict=True)):
+        before = studies[:place].count(text)  # the same file twice
+        said = f"{text}, {before + 1}" if before else text
+        shown.append(name if is_study(text) else name.replace(study_id, said))
+    return shown
 
 
 def pair(text: str) -> tuple[str, str]:

@@ -199,6 +199,10 @@ def test_cases_and_rows_of_a_spec_are_those_of_a_study(
     assert done.code == 0, done.err
     here_curves, there_curves = (found["curves"] for found in done.data["curves"].values())
     assert here_curves == there_curves
+    twice = sprag("compare", sources[0], sources[0], "--json")
+    first, second = twice.data["studies"]
+    assert (first.endswith(f"({sources[0]})"), second.endswith(f"({sources[0]}, 2)")) == (True, True), twice.data
+    assert list(twice.data["curves"]) == [first, second]
     refused = sprag("compare", sources[1], sources[1], "--db", kept)
     assert (refused.code, "--db: belongs to a spec" in refused.err) == (2, True)
 
