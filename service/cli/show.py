@@ -52,7 +52,9 @@ class _Views(Groups):
 
 
 app = typer.Typer(
-    help="Show a study: its state, or a view of it or of one of its cases.\n\nA spec is run here first.",
+    help="Show a study: its state, or a view of it or of one of its cases.\n\nA spec is run here first. "
+    "`sprag show WHAT -h` lists which of the options below a view has: --units and --db are of a study and of `case`, "
+    "--case and --start of one case.",
     no_args_is_help=True,
     cls=_Views,
     options_metavar="SPEC|ID",

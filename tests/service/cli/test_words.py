@@ -51,6 +51,20 @@ def test_there_are_twenty_words_and_few_options(sprag: Sprag) -> None:
     assert len(visible) <= 250
 
 
+def test_help_says_which_views_have_a_shared_option() -> None:
+    show = command_line().commands["show"]
+    titles = {name: title for title, name, _ in show.listed()}
+    views: dict[str, set[str]] = {}
+    for name, view in show.commands.items():
+        for option in view.params:
+            views.setdefault(option.name, set()).add("case" if name == "case" else titles[name])
+    assert views["units"] == views["db"] == {"Of a study", "case"}
+    assert views["case"] == {"Of one case (--case N)", "case"}
+    assert views["start"] == {"Of one case (--case N)"}
+    said = "--units and --db are of a study and of `case`, --case and --start of one case."
+    assert said in " ".join(show.help.split())
+
+
 def test_help_loads_no_command() -> None:
     code = (
         "import sys; from sprag_study.service.cli.app import execute; execute(['--help']); "
