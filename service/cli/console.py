@@ -298,18 +298,31 @@ Column = tuple[str, bool] | tuple[str, bool, bool]
 
 
 def show_table(title: str, columns: Iterable[Column], rows: Iterable[Sequence[object]]) -> None:
-    """Print a table on standard output; None becomes a dash: a value that could not be computed.
-
-    On a terminal it is as wide as that: headings and texts are broken into lines, and columns for which there is no
-    room go on below, each time beside the first one. Numbers and ids are never cut, and names with dots only after
-    these. Elsewhere it is for programs (`write_rows`), without its title.
-    """
-    headed = list(columns)
-    units = [head.si if isinstance(head, Heading) else "1" for head, *_ in headed]
-    cells = [list(map(in_unit, row, units)) for row in rows]
+    """Print a table on standard output: as `draw_table` on a terminal, elsewhere for programs, without its title."""
+    headed, cells = _in_units(columns, rows)
     if piped():
         write_rows([head.replace(".\n", ".") for head, *_ in headed], cells)
-        return
+    else:
+        _draw(title, headed, cells)
+
+
+def draw_table(title: str, columns: Iterable[Column], rows: Iterable[Sequence[object]]) -> None:
+    """Print a table for people, wherever it goes; None becomes a dash: a value that could not be computed.
+
+    It is as wide as the terminal: headings and texts are broken into lines, and columns for which there is no room go
+    on below, each time beside the first one. Numbers and ids are never cut, and names with dots only after these.
+    """
+    _draw(title, *_in_units(columns, rows))
+
+
+def _in_units(columns: Iterable[Column], rows: Iterable[Sequence[object]]) -> tuple[list[Column], list[list[object]]]:
+    """The columns, and the cells in the units of the reader."""
+    headed = list(columns)
+    units = [head.si if isinstance(head, Heading) else "1" for head, *_ in headed]
+    return headed, [list(map(in_unit, row, units)) for row in rows]
+
+
+def _draw(title: str, headed: Sequence[Column], cells: Sequence[Sequence[object]]) -> None:
     texts = [[cell_text(cell) for cell in row] for row in cells]
     from rich.cells import cell_len
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sprag_study.service.cli.common import wants_json
-from sprag_study.service.cli.console import ExitCode, TroubleError, say, show_table, table_words, write_json
+from sprag_study.service.cli.console import ExitCode, TroubleError, draw_table, say, write_json
 from sprag_study.service.cli.files import file_failure, write_pieces
 from sprag_study.service.cli.following import follow
 from sprag_study.service.cli.remote import served_by
@@ -127,7 +127,6 @@ def _show(client: Client, picture: Path) -> dict[str, Any]:
     return study
 
 
-@table_words()
 def _show_curve(curves: dict[str, Any]) -> None:
     """The mechanical characteristic as a table, the mean speed also as a bar."""
     from sprag_study.worker.models import OK
@@ -145,4 +144,4 @@ def _show_curve(curves: dict[str, Any]) -> None:
     held = ",\n".join(f"{path} {value}" for path, value in _HELD)
     headings = [(_("load\n[N*m]"), True), *((_(heading), True) for _name, heading in _TABLE), (_("mean speed"), False)]
     rows = list(zip(drawn["x"], *columns, bars, strict=True))
-    show_table(_("Mechanical characteristic at {place}", place=held), headings, rows)
+    draw_table(_("Mechanical characteristic at {place}", place=held), headings, rows)
