@@ -30,9 +30,8 @@ _NEAR, _FAR = 1e-9, 1e-5
 #: With an exponent below this, or halves that differ by more than so many standard errors, the motion still changes.
 _SHRINKS = -0.02
 _DRIFT = 4.0
-#: Periods of the longer batches of motions that change slowly. Intervals from them are widened by the correlation of
-#: batches. Above this factor of the variance, or where the speed passes its mean less often, they tell no steady mean.
-LONG = 80
+#: Intervals from longer batches are widened by the correlation of batches. Above this factor of the variance, or where
+#: the speed passes its mean less often, they tell no steady mean.
 _CORRELATED, _PASSES = 3.0, 4
 
 

@@ -88,8 +88,8 @@ def _apart(strobes: Floats, last: int, length: int, order: int, unit: Floats, en
 
 
 @compiled
-def keep_strobes(history: Floats, cases: Ints, count: int, strobes: Floats) -> None:
-    """Put new strobes of some cases behind the ``count`` that are there, whose oldest go if need be.
+def keep_strobes(history: Floats, cases: Ints, strobes: Floats) -> None:
+    """Put new strobes of some cases behind those that are there, whose oldest go.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def keep_strobes(history: Floats, cases: Ints, count: int, strobes: Floats) -> N
     kept, new = history.shape[1], strobes.shape[1]
     for k in range(cases.shape[0]):
         own = history[cases[k]]
-        for row in range(max(0, kept - count - new), kept):
+        for row in range(kept):
             for column in range(history.shape[2]):
                 later = row + new
                 own[row, column] = own[later, column] if later < kept else strobes[k, later - kept, column]

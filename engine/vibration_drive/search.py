@@ -38,6 +38,8 @@ Flags = NDArray[np.bool_]
 #: Periods before each of the first searches for an orbit; later rounds have `ROUND` periods.
 FIRST_ROUNDS = (12, 8, 10, 10, 15, 15, 20, 20, 30, 30, 30)
 ROUND = 40
+#: Periods of the longer batches of motions that change slowly (`irregular`).
+LONG = 80
 #: Strobes this close to those one orbit earlier, and approaching them, justify Newton's method.
 NEAR = 0.01
 #: The same, divided by the order: irregular motions return by chance, and trying a long orbit is expensive.
@@ -118,7 +120,8 @@ class Search:
     #: States at which cases begin (`strobes.continued`, or `from_rest`); None: all at their own initial values.
     given: Floats | None = None
     starts: Floats = field(init=False)
-    #: The last strobes of each case, the newest last, and how many of them are filled for those that still go on.
+    #: The last strobes of each case, the newest last, those of a batch at least, and how many of them are there for
+    #: those that still go on, as far as orbits are looked for in them.
     history: Floats = field(init=False)
     count: int = 0
     periods: Ints = field(init=False)
@@ -140,11 +143,16 @@ class Search:
         self.budget = RUNS * self.matrix[:, Column.MOST_STEPS]
         self.matrix[:, Column.MOST_STEPS] = self.budget
         self.starts = from_rest(cases, n) if self.given is None else self.given.copy()
-        self.history = np.zeros((cases, 3 * max(self.settings.max_period, WINDOW) + 1, width(n)))
+        self.history = np.zeros((cases, max(self._looked_at, LONG), width(n)))
         self.periods = np.zeros(cases, dtype=np.int64)
         self.turns = np.zeros((cases, self.settings.at_most))
         self.steps, self.events, self.wait, self.spent = (np.zeros(cases) for _ in range(4))
         self.endings = np.full(cases, _OK, dtype=np.int8)
+
+    @property
+    def _looked_at(self) -> int:
+        """Most strobes in which orbits are looked for."""
+        return 3 * max(self.settings.max_period, WINDOW) + 1
 
     @property
     def from_stop(self) -> Flags:
@@ -205,8 +213,8 @@ class Search:
         self.steps[active] += done.sums[:, OUT_STEPS]
         self.pay(active, done.sums[:, OUT_STEPS])
         self.events[active] += done.sums[:, OUT_EVENTS]
-        orbits.keep_strobes(self.history, active, self.count, done.strobes)
-        self.count = min(self.count + periods, self.history.shape[1])
+        orbits.keep_strobes(self.history, active, done.strobes)
+        self.count = min(self.count + periods, self._looked_at)
         self.starts[active] = done.strobes[:, -1]
         self.starts[active, TURN] = 0.0
         return done.sums

@@ -10,14 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 from sprag_study.engine.endings import ENDINGS, Ending
 from sprag_study.engine.run import MEANS_FROM_PERIODS, SettledRun
 from sprag_study.engine.vibration_drive.cases import Column, case_matrix, inertia_ratio, pendulum_count, unloaded
-from sprag_study.engine.vibration_drive.irregular import BATCHES, LONG, Batches, Means
+from sprag_study.engine.vibration_drive.irregular import BATCHES, Batches, Means
 from sprag_study.engine.vibration_drive.kernel import Kernel, kernel_of
 from sprag_study.engine.vibration_drive.lanes import RUNUP_SHARE
 from sprag_study.engine.vibration_drive.no_load import limit_of
 from sprag_study.engine.vibration_drive.orbits import distances, settling_periods
 from sprag_study.engine.vibration_drive.regimes import Regime, means, settled_infos
 from sprag_study.engine.vibration_drive.results import STEADY_SHAFT, result_infos
-from sprag_study.engine.vibration_drive.search import ROUND, RUNS, Orbits, Search, joined, transient_rounds
+from sprag_study.engine.vibration_drive.search import LONG, ROUND, RUNS, Orbits, Search, joined, transient_rounds
 from sprag_study.engine.vibration_drive.slow import march
 from sprag_study.engine.vibration_drive.strobes import (
     ANGLE,

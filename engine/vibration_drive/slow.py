@@ -37,11 +37,11 @@ Ints = NDArray[np.int64]
 
 #: Periods of the run after each step: a multiple of most low orders, so that its end has the phase of its beginning.
 _PERIODS = 24
-#: Runs that a case takes at most.
+#: Runs that a case takes at most in a march.
 _MOST_RUNS = 20
 #: Periods over which the pull is measured, rounded down to whole turns of the motion.
 _OVER = 8
-#: Steps of the speed as shares of its scale: the first, the least that is halved no more, and the largest.
+#: Steps of the speed as shares of its scale: the first, the least that is shortened no more, and the largest.
 _FIRST, _LEAST, _LARGEST = 0.05, 0.003, 0.15
 #: The largest step where the pull is within this share of the expected one, as that of a shaft that nothing drives.
 _EXACT, _FARTHEST = 0.01, 0.45
@@ -320,6 +320,7 @@ def march(search: Search, cases: Ints) -> tuple[Orbits, Floats]:
     marches = _Marches(search, cases)
     active = np.flatnonzero(marches.bases[:, SHAFT] == _ROTATING)
     for _ in range(_MOST_RUNS):
-        if len(active):
-            active = marches.go_on(active)
+        if not len(active):
+            break
+        active = marches.go_on(active)
     return joined(marches.certified, search), marches.bases

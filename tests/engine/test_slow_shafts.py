@@ -34,11 +34,13 @@ def _column(batch: SettledBatch, name: str) -> Floats:
     return values
 
 
-def _without(monkeypatch: pytest.MonkeyPatch, columns: dict[str, Any], cases: int) -> SettledBatch:
+def _without(
+    monkeypatch: pytest.MonkeyPatch, columns: dict[str, Any], cases: int, settings: SettledRun | None = None
+) -> SettledBatch:
     """What the search alone finds."""
     with monkeypatch.context() as patched:
         patched.setattr(settle_module, "_settle_slowly", lambda *arguments: None)
-        return settle(columns, SettledRun(), cases=cases)
+        return settle(columns, settings or SettledRun(), cases=cases)
 
 
 def test_slow_shafts_come_to_the_orbits_of_long_runs(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -84,6 +86,19 @@ def test_a_shaft_that_rises_and_falls_for_long_has_a_mean_with_an_interval(monke
     long = simulate(columns, run, cases=1).values[0, [info.name for info in settled_infos(1)].index("shaft.speed.mean")]
     width = _column(batch, "shaft.speed.mean.half_width")[0]
     assert abs(_column(batch, "shaft.speed.mean")[0] - long) < width < 0.05 * long
+
+
+@pytest.mark.parametrize("max_period", [8, 20])
+def test_exponents_are_those_of_a_search_for_longer_orbits(max_period: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Batches are longer than what is kept of a motion to find its short orbits."""
+    columns = _some([105])
+    for settled in (settle, lambda columns, run, cases: _without(monkeypatch, columns, cases, run)):
+        exponents = [
+            float(_column(settled(columns, SettledRun(max_period=most), cases=1), "regime.exponent")[0])
+            for most in (max_period, 32)
+        ]
+        # The scales of the strobes follow from the last ones.
+        assert exponents[0] == pytest.approx(exponents[1], rel=1e-2)
 
 
 def test_a_heavy_shaft_that_runs_out_is_held(monkeypatch: pytest.MonkeyPatch) -> None:
