@@ -186,9 +186,10 @@ class Here(Connection):
     def _found(self, study_id: str, view: StudyView[Any, Any, Any], chosen: Any, form: str) -> StudyAnswer[Any, Any]:
         revision, is_picture = self.library.store.studies.get(study_id).revision, view.drawn_differs and is_drawn(form)
         asked_for = (study_id, revision, view.about.name, chosen, is_picture)
-        if self._latest is None or self._latest[0] != asked_for:
-            self._latest = asked_for, answer_of(self.library, study_id, view, chosen, drawn=is_picture)
-        return self._latest[1]
+        latest = self._latest  # another thread may ask for another view meanwhile
+        if latest is None or latest[0] != asked_for:
+            latest = self._latest = asked_for, answer_of(self.library, study_id, view, chosen, drawn=is_picture)
+        return latest[1]
 
     def _case(self, study_id: str, study: Study, case: int, name: str | None, form: Any, query: Query) -> bytes:
         if case >= study.cases:

@@ -292,3 +292,18 @@ def test_axes_are_a_table_too(run: sprag.Study) -> None:
     table = sprag.run({**_small(), "axes": frame}, processes=0)
     assert table[FREQUENCY].tolist() == [25.0] * 3
     np.testing.assert_allclose(table[SPEED], run.table()[SPEED], rtol=1e-9)
+
+
+def test_a_thread_gets_the_view_that_it_asks_for(
+    service: Service, settings: Settings, spec: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study_id = service.submit(spec)
+    service.fill(study_id)
+    kept: list[Any] = []  # the first view stands for that of another thread, which is kept at the same moment
+    latest = property(lambda _here: kept[0] if kept else None, lambda _here, pair: kept.append(pair) if pair else None)
+    monkeypatch.setattr(OfService, "_latest", latest, raising=False)
+    here = OfService(service.store, settings)
+    for name in ("explore", "answers"):
+        found = here.request("GET", f"/studies/{study_id}/{name}")
+        assert found == service.get(f"/studies/{study_id}/{name}")
+    assert len(kept) == 2
