@@ -19,7 +19,7 @@ _SENTENCE: Final = 400
 #: What ends the first part of a help text.
 _PART: Final = re.compile(r"[;:.](?: |$)")
 #: Options of every command, which may stand anywhere in the line, and how many values each has.
-_ANYWHERE: Final = {"--json": 0, "--server": 1, "--token": 1, "--language": 1}
+ANYWHERE: Final = {"--json": 0, "--server": 1, "--token": 1, "--language": 1}
 
 
 class Word(NamedTuple):
@@ -74,7 +74,7 @@ def command_of(name: str, source: Callable[..., None] | typer.Typer) -> Any:
 
 def _pointing(command: Any) -> None:
     """Let the help of a command say where the options of all commands are explained."""
-    options = ", ".join(_ANYWHERE)
+    options = ", ".join(ANYWHERE)
     everywhere = _("`sprag -h` explains {options}, which every command has.", options=options)
     command.epilog = "\n\n".join(filter(None, (command.epilog, everywhere)))
     for inner in getattr(command, "commands", {}).values():
@@ -158,9 +158,9 @@ def common_first(line: Sequence[str]) -> tuple[list[str], list[str]]:
         name, equals, _value = word.partition("=")
         if word == "--":
             rest += [word, *words]
-        elif name in _ANYWHERE or (not rest and word.startswith("-")):
+        elif name in ANYWHERE or (not rest and word.startswith("-")):
             front.append(word)
-            if not equals and _ANYWHERE.get(name):
+            if not equals and ANYWHERE.get(name):
                 value = next(words, None)
                 if value is None:
                     return front, []

@@ -13,6 +13,7 @@ from typing import Any, Final, cast
 import typer
 
 from sprag_study.service import languages
+from sprag_study.service.cli.groups import ANYWHERE
 from sprag_study.service.languages import ENGLISH, N_, _
 
 OPTION: Final = "--language"
@@ -99,6 +100,8 @@ def _asked(arguments: Sequence[str]) -> str:
             return value if equals else next(rest, "")
         if not argument.startswith("-"):
             break
+        if not equals and ANYWHERE.get(name):
+            next(rest, None)
     return ""
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict
 from datetime import UTC, datetime
@@ -203,9 +203,7 @@ def presets(
         if wants_json():
             write_json({"presets": list(names), "about": {item: asdict(ABOUT[item]) for item in names}})
         else:
-            with table_words():
-                columns = ((_("preset"), False, True), (_("shows"), False))
-                show_table("", columns, [(item, _(ABOUT[item].shows)) for item in names])
+            _show_presets((item, ABOUT[item].shows) for item in names)
         return
     if name not in names:
         message = N_("unknown preset")
@@ -229,7 +227,13 @@ def _presets_of_service(name: str | None) -> None:
         about = {item["name"]: {part: item[part] for part in ("shows", "values", "cases")} for item in listed}
         write_json({"presets": [item["name"] for item in listed], "about": about})
     else:
-        rows = [(item["name"], _(item["shows"])) for item in listed]
+        _show_presets((item["name"], item["shows"]) for item in listed)
+
+
+def _show_presets(presets: Iterable[tuple[str, str]]) -> None:
+    """Names of presets and what each shows, as a table."""
+    with table_words():
+        rows = [(name, _(shows)) for name, shows in presets]
         show_table("", ((_("preset"), False, True), (_("shows"), False)), rows)
 
 

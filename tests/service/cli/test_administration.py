@@ -128,6 +128,7 @@ def test_a_named_service_answers_what_a_command_also_finds_out_here(
         assert told == kept, (command, remote.err)
         if command != "check SPEC":
             assert asked(*words).out == sprag(*words).out
+    assert asked("--language", "uk", "presets").out == asked("presets").out
     assert json.loads(asked("presets", "one_pendulum").out)["model"] == "vibration-drive"
     spec.write_text(json.dumps({**SPEC, "axes": 7}))
     wrong = asked("check", spec, "--json")

@@ -107,6 +107,7 @@ COMMANDS = list(commands(command_line("en")))
         (["list"], {"LANG": "uk_UA.UTF-8", "SPRAG_LANGUAGE": "en"}, "en"),
         (["--language", "uk", "list"], {"SPRAG_LANGUAGE": "en"}, "uk"),
         (["--language=uk", "list"], {}, "uk"),
+        (["--server", "http://a", "--token=x", "--language", "uk", "list"], {}, "uk"),
         (["list", "--language", "uk"], {}, ""),
         (["list"], {"SPRAG_LANGUAGE": "uk_UA.UTF-8"}, "uk"),
         (["list", "--json"], {"SPRAG_LANGUAGE": "uk"}, "en"),
