@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -39,6 +39,9 @@ _EachCase = Annotated[
     bool, typer.Option("--all", help="A row for each case instead: its axes, the outcome and the results.")
 ]
 
+#: What 1.0.0 has beside the ending of FILE, for one release (`sprag_study.service.cli.old_words`).
+_Form = Annotated[Literal["csv", "json"] | None, typer.Option("--format", hidden=True)]
+
 
 def command(about: ViewInfo) -> Callable[..., None]:
     """The command of a view."""
@@ -47,9 +50,10 @@ def command(about: ViewInfo) -> Callable[..., None]:
 
     def run(
         spec: str, case: int, file: str | None, points_file: str | None = None, tables: list[str] | None = None,
-        start: int | None = None, every: bool = False, decimal: Decimal | None = None, **settings: Any,
+        start: int | None = None, every: bool = False, decimal: Decimal | None = None, form: str | None = None,
+        **settings: Any,
     ) -> None:  # fmt: skip
-        written = value_format(file, PICTURES if about.pictures else ())
+        written = value_format(file, PICTURES if about.pictures else (), form)
         require_csv(None, decimal, written)
         drawing = [*(in_language() if written in PICTURES else ()), *in_decimals(decimal)]
         if is_study(spec):
@@ -85,6 +89,7 @@ def command(about: ViewInfo) -> Callable[..., None]:
     shared |= dict.fromkeys(("tables", "file", "decimal"))
     last = [parameter(name, SHARED[name], default) for name, default in shared.items()]
     last += [parameter("every", _EachCase, False)] if about is TRANSIENT else []
+    last += [parameter("form", _Form, None)]
     return signed(run, about.summary, [parameter("spec", SpecOrStudy, ...), *options, *last])
 
 

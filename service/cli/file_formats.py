@@ -43,8 +43,10 @@ def table_format(form: TableFormat | None, file: str | None) -> TableFormat:
     return found
 
 
-def value_format(file: str | None, pictures: Sequence[str] = ()) -> str:
-    """The format of a view of one case: by the ending of a file; WrongInputError for an unknown one."""
+def value_format(file: str | None, pictures: Sequence[str] = (), form: str | None = None) -> str:
+    """The format of a view of one case: by the ending of a file, unless given; WrongInputError for an unknown one."""
+    if form is not None:
+        return form
     if file is not None and _has_ending(file):
         return file_format(file, ("csv", "json", *pictures))
     return "json" if wants_json() else "csv"

@@ -20,7 +20,7 @@ _OPTIONS: Final = {("diagram", "points"): "values", ("basin", "points"): "grid"}
 GONE: Final = {
     ("show", "--processes"): "SPRAG_PROCESSES",
     ("check", "--processes"): "SPRAG_PROCESSES",
-    ("show", "--format"): "--json",
+    ("show", "--format"): "-o FILE.csv",
     ("run", "--chunk"): "SPRAG_CHUNK_CASES",
     ("serve", "--chunk"): "SPRAG_CHUNK_CASES",
     ("serve", "--tls-certificate"): "SPRAG_TLS_CERTIFICATE",
@@ -44,9 +44,8 @@ OLD: Final = {
 def forwarded(words: Sequence[str]) -> tuple[list[str], str]:
     """The words of today for those of a command line, and the new name where the old one was used, else ``""``."""
     name, rest = (words[0], list(words[1:])) if words else ("", [])
-    place = 0 if name == "db" else 1
-    if list(words[place : place + 2]) == ["db", "audit"] and name in ("db", "admin"):
-        return ["admin", "audit", *words[place + 2 :]], "admin audit"
+    if (options := _audit(words)) is not None:
+        return ["admin", "audit", *options], "admin audit"
     if name not in OLD:
         return list(words), ""
     new = [word for word in OLD[name].split() if word != "ID"]
@@ -54,6 +53,15 @@ def forwarded(words: Sequence[str]) -> tuple[list[str], str]:
         shown = _of_case(rest)
         return ["show", *shown], OLD[name] if shown[0] == "case" else f"show ID {shown[0]} --case N"
     return [*new, *rest], OLD[name]
+
+
+def _audit(words: Sequence[str]) -> list[str] | None:
+    """What else a line of ``[admin] db audit`` has, where ``--db URL`` may stand between the words; None for others."""
+    named = [k for k, word in enumerate(words) if not word.startswith("-") and words[max(k - 1, 0)] != "--db"]
+    for old in (["admin", "db", "audit"], ["db", "audit"]):
+        if [words[k] for k in named[: len(old)]] == old:
+            return [word for k, word in enumerate(words) if k not in named[: len(old)]]
+    return None
 
 
 def _of_case(words: Sequence[str]) -> list[str]:
@@ -89,10 +97,11 @@ def without_gone(words: Sequence[str]) -> tuple[list[str], dict[str, str], list[
         if instead is None:
             kept.append(word)
             continue
-        value = value if equals else next(rest, "")
-        gone.append((option, instead))
-        if not instead.startswith("--"):
+        following = [] if equals else [*islice(rest, 1)]
+        value = value if equals else "".join(following)
+        gone.append((option, "--json" if value == "json" else instead))
+        if instead.startswith("-") or not value.strip("0"):  # read as before, or refused: 0 is no value of an option
+            kept += [word, *following]
+        else:
             settings[instead] = value
-        elif value == "json":
-            kept.append(instead)
     return kept, settings, gone

@@ -99,6 +99,9 @@ def test_old_names_keep_their_arguments() -> None:
     assert forwarded(["list", "curve"]) == (["list", "curve"], "")
     for old in (["admin", "db", "audit"], ["db", "audit"]):
         assert forwarded([*old, "--json"]) == (["admin", "audit", "--json"], "admin audit")
+    for words in (["admin", "--db", "db", "db", "audit"], ["admin", "db", "--db", "db", "audit"]):
+        assert forwarded(words) == (["admin", "audit", "--db", "db"], "admin audit")
+    assert forwarded(["admin", "--db", "db", "audit"]) == (["admin", "--db", "db", "audit"], "")
 
 
 def test_options_that_are_gone_are_forwarded_with_a_line(
@@ -111,9 +114,24 @@ def test_options_that_are_gone_are_forwarded_with_a_line(
     assert "SPRAG_PROCESSES" not in os.environ
     assert without_gone(["admin", "worker", "--processes", "2"])[1] == {"SPRAG_PROCESSES": "2"}
     assert without_gone(["show", "a", "strobes", "--format=json"]) == (
-        ["show", "a", "strobes", "--json"], {}, [("--format", "--json")],
+        ["show", "a", "strobes", "--format=json"], {}, [("--format", "--json")],
     )  # fmt: skip
+    for words in (["check", "a", "--processes"], ["run", "a", "--chunk", "0"], ["serve", "--chunk="]):
+        assert without_gone(words)[:2] == (words, {})
+        done = sprag(*words)
+        assert (done.code, "No such option: --" in done.err) == (2, True), done.err
     assert without_gone(["export", "a", "--format", "csv"]) == (["export", "a", "--format", "csv"], {}, [])
+
+
+def test_a_format_that_is_gone_is_that_of_the_file(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
+    words = ("show", examples / "one_pendulum.json", "trajectory", "--points", 2, "-o")
+    line = {"csv": "`--format` is `-o FILE.csv` from now on", "json": "`--format` is `--json` from now on"}
+    for name, form in (("m.txt", "csv"), ("m.csv", "json")):
+        done = sprag(*words, tmp_path / name, "--format", form)
+        assert (done.code, line[form] in done.err) == (0, True), done.err
+        assert (tmp_path / name).read_text().startswith("{") == (form == "json")
+    done = sprag(*words, tmp_path / "m.csv", "--format", "xml")
+    assert (done.code, "'xml' is not one of 'csv', 'json'" in done.err) == (2, True), done.err
 
 
 def test_a_misspelt_view_is_named_with_those_that_the_study_has(sprag: Sprag, examples: Path) -> None:
