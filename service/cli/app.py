@@ -12,6 +12,7 @@ from functools import cache
 from typing import Annotated, Any, Final, cast
 
 import typer
+from typer._click.core import ParameterSource
 from typer.core import TyperGroup
 from typer.main import get_command
 
@@ -72,6 +73,7 @@ def _known_language(code: str | None) -> str | None:
 
 @app.callback()
 def _every_command(
+    context: typer.Context,
     _version: Annotated[
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
     ] = False,
@@ -99,7 +101,8 @@ def _every_command(
     ] = False,
 ) -> None:
     """Options of every command; typer shows the application's own help instead of this text."""
-    CURRENT.set(Common(server, token, as_json, language))
+    typed = context.get_parameter_source("language") is ParameterSource.COMMANDLINE
+    CURRENT.set(Common(server, token, as_json, language if typed else None))
 
 
 _HERE, _SERVICE, _OPERATE = N_("Studies"), N_("A service"), N_("Administration")
@@ -160,7 +163,7 @@ def _executed(common: Sequence[str], typed: Sequence[str]) -> int:
     try:
         words, new = forwarded(typed)
         if new and not wants_json():
-            old = " ".join(typed[:3] if typed[0] == "admin" else typed[:1])
+            old = "admin db audit" if typed[0] == "admin" else typed[0]
             say(_("`sprag {old}` is called `sprag {new}` from now on", old=old, new=new))
         words, settings, gone = without_gone(words)
         if not wants_json():

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Annotated, Any, Final
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
 from sprag_study.service.cli import completion
+from sprag_study.service.cli.case_views import naming_options
 from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.compare import pair
 from sprag_study.service.cli.console import (
@@ -30,6 +32,9 @@ from sprag_study.service.faults import Fault
 from sprag_study.service.languages import N_, _
 from sprag_study.service.views.setting import settings_of
 from sprag_study.service.views.study_questions import CasesQuestion, SelectionQuestion
+
+if TYPE_CHECKING:
+    from sprag_study.service.spec.document import ParsedSpec
 
 #: Most cases of one request.
 _PAGE = 500
@@ -57,7 +62,9 @@ def _cases(
     for text in asked["at"] or ():
         pair(text)
     require_table(units)
-    with opened(study, points=points_file, tables=tables, db=db) as (source, study_id):
+    with opened(
+        study, points=points_file, tables=tables, db=db, units=units, check=partial(_check, asked, result or ())
+    ) as (source, study_id):
         query = [*query_of(_ASKED, asked), ("page_size", str(min(limit, _PAGE)))]
         found, si = _first(source.pages(f"{study_path(study_id)}/cases", query), limit)
         if wants_json():
@@ -79,6 +86,27 @@ cases: Final = signed(
 )  # fmt: skip
 
 
+def _check(asked: Mapping[str, Any], results: Sequence[str], parsed: ParsedSpec) -> None:
+    """Refuse what the study of a spec has not before it is run; WrongInputError."""
+    from sprag_study.service.views.case_pages import check, wanted
+    from sprag_study.worker.models import study_results
+
+    _require_results(results, [info.name for info in study_results(parsed.study)])
+    with naming_options(parsed.study, _ASKED, ""):
+        query = wanted(CasesQuestion(**asked))
+        if parsed.study.plan is None:  # otherwise the cases that it chooses decide what can be asked
+            check(parsed.study, query)
+
+
+def _require_results(names: Sequence[str], known: Collection[str]) -> None:
+    """Raise WrongInputError for names of no result."""
+    allowed = ", ".join(known)
+    unknown = [name for name in names if name not in known]
+    faults = [Fault("--result", "unknown-name", N_("is not a result"), name, allowed) for name in unknown]
+    if faults:
+        raise WrongInputError("invalid-parameter", _("invalid option"), faults)
+
+
 def case(
     study: SpecOrStudy,
     case: CaseOption = 0,
@@ -91,7 +119,7 @@ def case(
     from sprag_study.service.client.wire import case_path
 
     require_table(units)
-    with opened(study, points=points_file, tables=tables, db=db) as (source, study_id):
+    with opened(study, points=points_file, tables=tables, db=db, units=units, case=case) as (source, study_id):
         shown = source.request("GET", case_path(study_id, case, ""))
         if wants_json():
             write_json(shown)
@@ -129,11 +157,7 @@ def _show(
     shown: Sequence[dict[str, Any]], first: Mapping[str, Any], results: Sequence[str], units: Mapping[str, str]
 ) -> None:
     """A row for each case: its parameters, how it ended, its regime and flags, and the chosen results; as ``first``."""
-    unknown = [name for name in results if name not in first["results"]]
-    if unknown:
-        allowed = ", ".join(first["results"])
-        faults = [Fault("--result", "unknown-name", N_("is not a result"), name, allowed) for name in unknown]
-        raise WrongInputError("invalid-parameter", _("invalid option"), faults)
+    _require_results(results, first["results"])
     kinds = [name for name in ("regime", "regime.order") if name in first["results"] and name not in results]
     columns = [(_("case"), True), *((heading(path, units.get(path, "1")), True) for path in first["parameters"])]
     columns += [(_("ending"), False), (_("flags"), False)]

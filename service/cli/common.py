@@ -17,7 +17,7 @@ from sprag_study.service.login import GIVEN, LOGIN, VARIABLE, Access, access_of,
 
 @dataclass(frozen=True, slots=True)
 class Common:
-    """The options that every command has."""
+    """The options that every command has; ``language`` is that of the command line, not that of the environment."""
 
     server: str | None = None
     token: str | None = None

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from typing import Annotated
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from sprag_study.service.answers.differing import MOST_COMPARED
 from sprag_study.service.cli import completion
+from sprag_study.service.cli.case_views import naming_options
 from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import (
     Column,
@@ -27,6 +30,11 @@ from sprag_study.service.cli.remote import opened
 from sprag_study.service.cli.shown import show_curves, write_curves
 from sprag_study.service.cli.sources import is_study, refuse_local
 from sprag_study.service.languages import N_, _
+from sprag_study.service.views.setting import settings_of
+from sprag_study.service.views.study_questions import CurvesQuestion
+
+if TYPE_CHECKING:
+    from sprag_study.service.spec.document import ParsedSpec
 
 
 def compare(
@@ -71,8 +79,12 @@ def compare(
     if all(map(is_study, studies)):
         refuse_local(db=db)
     held = dict(pair(text) for text in at or ())
+    asked = CurvesQuestion(x, y, *((by, at) if x else (None, None)), rest="usual")  # else those of the first x
     with ExitStack() as stack:
-        sources = [stack.enter_context(opened(text, db=None if is_study(text) else db)) for text in studies]
+        sources = [
+            stack.enter_context(opened(text, db=None if is_study(text) else db, check=partial(_check, asked)))
+            for text in studies
+        ]
         named = [Study(source, study_id) for source, study_id in sources]
         found = side_by_side(named, x, y or (), by=by or (), at=held)
     ids = [study_id for _, study_id in sources]
@@ -81,7 +93,12 @@ def compare(
     if wants_json():
         write_json({"studies": names, "inputs": found.inputs, "curves": dict(curves)})
         return
-    rows = [(pointer, *map(_text, values)) for pointer, values in found.inputs.items()]
+    _show(names, found.inputs, curves)
+
+
+def _show(names: Sequence[str], inputs: Mapping[str, Sequence[object]], curves: Sequence[tuple[str, Any]]) -> None:
+    """The inputs that differ, a column for each study, and the curves of each."""
+    rows = [(pointer, *map(_text, values)) for pointer, values in inputs.items()]
     with table_words():
         columns: list[Column] = [(_("input"), False, True), *((name, False) for name in names)]
         if rows or piped():
@@ -106,6 +123,17 @@ def _by_file(names: Sequence[str], studies: Sequence[str], ids: Sequence[str]) -
         said = f"{text}, {before + 1}" if before else text
         shown.append(name if is_study(text) else name.replace(study_id, said))
     return shown
+
+
+def _check(asked: CurvesQuestion, parsed: ParsedSpec) -> None:
+    """Refuse axes and results that the study of a spec has not before it is run; WrongInputError."""
+    from sprag_study.service.views.curves import CurvesView
+
+    view, study = CurvesView(), parsed.study
+    if study.plan is None and study.axes and (asked.x or asked.y):
+        with naming_options(study, settings_of(CurvesQuestion), ""):
+            own = [text for text in asked.at or () if pair(text)[0] in study.axis_paths]  # others may have the rest
+            view.check(study, view.choose(study, replace(asked, x=asked.x or study.axis_paths[0], at=own)))
 
 
 def pair(text: str) -> tuple[str, str]:

@@ -48,7 +48,7 @@ def _export(
         raise wrong_option(f"--{given[0][0]}", "not-used", N_("only reports have it"), given[0][1], allowed="pdf, html")
     settings_given = [(name, value) for name, value in (("header", header), ("decimal", decimal)) if value is not None]
     query = [*in_units(units), *given, *settings_given, *(() if table else in_language())]
-    with opened(study, db=db) as (source, study_id):
+    with opened(study, db=db, units=units) as (source, study_id):
         path = study_path(study_id)
         report = f"{path}/report", [*query, ("format", chosen)]
         with source.rows(path, chosen, query) if table else source.pieces(*report) as pieces:

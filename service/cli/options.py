@@ -141,7 +141,7 @@ def in_decimals(decimal: Decimal | None) -> list[tuple[str, str]]:
 
 
 def in_language() -> list[tuple[str, str]]:
-    """The language of a picture as a query: that of --language, not that of the system."""
+    """The language of a picture or a report as a query: that of --language, not of SPRAG_LANGUAGE or the system."""
     language = CURRENT.get().language
     return [] if language is None else [("language", language)]
 

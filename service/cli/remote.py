@@ -25,7 +25,7 @@ from sprag_study.service.cli.console import (
     warning_lines,
     write_json,
 )
-from sprag_study.service.cli.files import naming_points, read_spec, read_study
+from sprag_study.service.cli.files import naming_points, read_spec, read_study, require_cases
 from sprag_study.service.cli.following import show_study, submitted, submitting
 from sprag_study.service.cli.names import study_of
 from sprag_study.service.cli.options import (
@@ -153,12 +153,13 @@ def _option(parameter: object) -> str:
 @contextmanager
 def opened(
     text: str, *, points: str | None = None, tables: list[str] | None = None, db: str | None = None,
-    change: Callable[[object], object] | None = None, check: Callable[[ParsedSpec], None] | None = None, **of_spec: Any,
+    change: Callable[[object], object] | None = None, check: Callable[[ParsedSpec], None] | None = None,
+    units: str | None = None, case: int | None = None, **of_spec: Any,
 ) -> Iterator[tuple[Connection, str]]:  # fmt: skip
     """Who is asked about a study, and its id: a service, or the database in which the study of a spec is run first.
 
-    ``change`` completes the spec, ``check`` looks at its study before it is run; ``of_spec`` are further options that
-    only a spec has.
+    ``change`` completes the spec, ``check`` looks at its study before it is run, and so is refused what it has not of
+    ``units`` and ``case``; ``of_spec`` are further options that only a spec has.
     """
     if is_study(text):
         refuse_local(**of_spec, points_file=points, tables=tables, db=db)
@@ -168,6 +169,10 @@ def opened(
     require_store(db)
     parsed = read_study(text, points, change, tables)
     say(*warning_lines(parsed.warnings))
+    if units is not None:
+        _reading(parsed, units)
+    if case is not None and parsed.study.plan is None:  # otherwise the study chooses its cases
+        require_cases(parsed.study, [case])
     if check is not None:
         check(parsed)
     from sprag_study.service.here import Here
@@ -197,17 +202,22 @@ def read_in(source: Connection, study_id: str, units: str | None) -> Iterator[Ca
 
         yield plain
         return
-    from sprag_study.service.reading.reader import Choice, reading_for
     from sprag_study.service.spec.document import parse_spec
 
-    parsed = parse_spec(detail()["spec"])
+    reading = _reading(parse_spec(detail()["spec"]), units)
+    with tables_in(reading.units):
+        yield lambda: reading
+
+
+def _reading(parsed: ParsedSpec, units: str) -> Reading:
+    """The reading of a study in units; raises WrongInputError for units that it has not."""
+    from sprag_study.service.reading.reader import Choice, reading_for
+
     try:
-        reading = reading_for(parsed.study, parsed.spec, Choice(units))
+        return reading_for(parsed.study, parsed.spec, Choice(units))
     except FaultError as error:
         faults = [replace(fault, where="--units") for fault in error.faults]
         raise WrongInputError("invalid-parameter", _("invalid option"), faults) from error
-    with tables_in(reading.units):
-        yield lambda: reading
 
 
 def submit(

@@ -366,7 +366,8 @@ def show_calibration(found: dict[str, Any]) -> None:
         numbers = (one["value"], *(one["interval"] or (None, None)), one["deviation"])
         rows.append((heading(one["name"], one["unit"]), *(in_unit(number, one["unit"]) for number in numbers)))
     show_table(_("Values and 95 % intervals"), columns, rows)
-    if piped():
+    if piped():  # a table has its sentences beside it
+        say(*found["sentences"])
         return
     if found["correlations"] and len(rows) > 1:
         names = [one["name"] for one in found["parameters"]]

@@ -105,19 +105,21 @@ def _function_of(command: Command) -> Callable[..., None]:
         from sprag_study.service.client.wire import study_path
 
         with opened(
-            study, points=points_file, tables=tables, db=db, measured=measured,
+            study, points=points_file, tables=tables, db=db, units=units, measured=measured,
             change=None if measured is None else partial(_with_measured, measured),
-            check=partial(_check, about, asked, settings, units),
+            check=partial(_check, about, asked, settings),
         ) as (source, study_id):  # fmt: skip
             view = f"{study_path(study_id)}/{about.name}"
             if file is not None and form is not None:
                 with source.pieces(view, [*query_of(asked, whole), *drawing, ("format", form)]) as pieces:
                     write_pieces(file, pieces)
-            query = query_of(asked, settings)
-            answer = source.request("GET", view, params=query)
+            query, rows = query_of(asked, settings), piped() and command.in_rows and not wants_json()
+            # A service computes each form of an answer by itself; in rows only the number of cases of a file is said.
+            needed = not rows or (file is not None and most is not None)
+            answer = source.request("GET", view, params=query) if needed else {}
             if wants_json():
                 write_json(answer)
-            elif piped() and command.in_rows:
+            elif rows:
                 write_table(source.read(view, [*query, *in_units(units), ("format", "csv")]))
             else:
                 with read_in(source, study_id, units) as reading, table_words():
@@ -158,16 +160,13 @@ def _probability(text: str) -> float:
 
 
 def _check(
-    about: ViewInfo, asked: tuple[NamedSetting, ...], settings: dict[str, Any], units: str | None, parsed: ParsedSpec
+    about: ViewInfo, asked: tuple[NamedSetting, ...], settings: dict[str, Any], parsed: ParsedSpec
 ) -> None:  # fmt: skip
     """Refuse what the study of a spec cannot be asked before it is run; WrongInputError."""
-    from sprag_study.service.reading.quantities import SI
-    from sprag_study.service.reading.reader import Choice, reading_for
     from sprag_study.service.views.studies import STUDY_VIEWS
 
     view = STUDY_VIEWS[about.name]
     with naming_options(parsed.study, asked, ""):
-        reading_for(parsed.study, parsed.spec, Choice(units or SI))
         if parsed.study.plan is None:  # otherwise the cases that it chooses decide what can be asked
             view.check(parsed.study, view.choose(parsed.study, about.question(**settings)))
 

@@ -12,7 +12,7 @@ import numpy as np
 from sprag_study.service.exports import rows_json
 from sprag_study.service.faults import choice_of, parameter_error
 from sprag_study.service.reading.directions import case_units
-from sprag_study.service.results.explore import After, ExploreQuery
+from sprag_study.service.results.explore import After, ExploreQuery, plan_of
 from sprag_study.service.storage.studies.records import RowBlock
 from sprag_study.service.views.curves import pairs
 from sprag_study.service.views.explore import explored, selection
@@ -57,6 +57,14 @@ def by_number(query: ExploreQuery) -> bool:
     return query.sort == "case" and not (query.where or query.at)
 
 
+def check(study: Study, query: ExploreQuery) -> None:
+    """Refuse what a study has not, before its cases are run; `case_page` refuses it as well. FaultError."""
+    if by_number(query):
+        _require_kinds(query)
+    else:
+        plan_of(study, query)
+
+
 def case_page(library: Library, study_id: str, query: ExploreQuery, page_token: str | None) -> CasePage:
     """At most ``query.limit`` finished cases after those of the page before.
 
@@ -87,7 +95,8 @@ def case_page(library: Library, study_id: str, query: ExploreQuery, page_token: 
     return CasePage(block, token, found.count)
 
 
-def _numbered(library: Library, study_id: str, query: ExploreQuery, page_token: str | None) -> CasePage:
+def _require_kinds(query: ExploreQuery) -> None:
+    """Raise FaultError for an ending, a regime or a flag of no model."""
     known: dict[str, Iterable[str]] = {
         "ending": models.ENDING_SENTENCES,
         "regime": models.REGIME_SENTENCES,
@@ -96,6 +105,10 @@ def _numbered(library: Library, study_id: str, query: ExploreQuery, page_token: 
     for name, names in known.items():
         if chosen := getattr(query, name):
             choice_of(name, chosen, map(str, names))
+
+
+def _numbered(library: Library, study_id: str, query: ExploreQuery, page_token: str | None) -> CasePage:
+    _require_kinds(query)
     if page_token is not None and not (page_token.isascii() and page_token.isdigit() and len(page_token) < 19):
         raise _not_a_token(page_token)
     kinds = (query.ending or None, query.regime or None, query.flag or None)

@@ -23,7 +23,7 @@ from sprag_study.service.cli.console import (
     write_json,
 )
 from sprag_study.service.cli.extend import _what_is_new
-from sprag_study.service.cli.shown import show_curves, show_map
+from sprag_study.service.cli.shown import show_calibration, show_curves, show_map
 from sprag_study.service.faults import Fault
 
 
@@ -141,6 +141,14 @@ def test_points_of_a_map_with_flags_are_marked(capsys: pytest.CaptureFixture[str
     assert shown.err == "* flags: not_settled 2\n"
     show_map({"x": x, "y": y, "z": z, "at": {}, "units": {}})
     assert "*" not in capsys.readouterr().out
+
+
+def test_sentences_of_a_calibration_are_beside_its_table(capsys: pytest.CaptureFixture[str]) -> None:
+    one = {"name": "shaft.inertia", "unit": "kg*m^2", "value": 0.002, "interval": [0.001, 0.003], "deviation": 0.0005}
+    show_calibration({"parameters": [one], "correlations": None, "sentences": ["Measure at 28 Hz."]})
+    shown = capsys.readouterr()
+    assert shown.out.splitlines()[1] == "shaft.inertia [kg*m^2]\t0.002\t0.001\t0.003\t0.0005"
+    assert shown.err == "Measure at 28 Hz.\n"
 
 
 def test_what_an_extension_adds_is_told() -> None:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import pytest
 import typer
 
-from sprag_study.service import languages
 from sprag_study.service.cli import case_views, remote
 from sprag_study.service.cli import sources as of_commands
 from sprag_study.service.cli.app import command_line
@@ -74,7 +73,9 @@ def test_views_of_a_study(
     assert tables[0] == tables[1]
 
 
-def test_views_of_a_case(sprag: Callable[..., Finished], sources: tuple[Path, str], tmp_path: Path) -> None:
+def test_views_of_a_case(
+    sprag: Callable[..., Finished], sources: tuple[Path, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     for name, options in (("trajectory", ("--points", 5)), ("engagements", ()), ("strobes", ("--table", "strobes"))):
         here, there = (sprag("show", source, name, "--case", 1, *options, "--json") for source in sources)
         assert (here.code, there.code) == (0, 0), here.err + there.err
@@ -83,7 +84,8 @@ def test_views_of_a_case(sprag: Callable[..., Finished], sources: tuple[Path, st
     for number, source in enumerate(sources):
         file = tmp_path / f"{number}.svg"
         for options in ((), ("--language", "uk")):
-            with languages.language("uk"):  # that of the command, which pictures have only where it is asked for
+            with monkeypatch.context() as patch:  # the language of messages, which pictures have only on request
+                patch.setenv("SPRAG_LANGUAGE", "uk")
                 assert sprag("show", source, "strobes", "--case", 1, "-o", file, *options).code == 0
             pictures.append(file.read_text())
     assert pictures[:2] == pictures[2:]
@@ -173,9 +175,23 @@ def test_wrong_settings_name_their_options(
         (("curves", "--units", "rpm", "--json"), "JSON is in SI units"),
         (("curves", "--units", "bogus"), "--units"),
         (("curves", "--y", "speed"), "did you mean 'shaft.speed.mean'?"),
+        (("cases", "--result", "wrong"), "--result"), (("cases", "--units", "bogus"), "--units"),
+        (("cases", "--at", "nonsense=3"), "--at"), (("cases", "--where", "nonsense > 3"), "--where"),
+        (("cases", "--sort", "nonsense"), "--sort"), (("cases", "--ending", "nonsense"), "--ending"),
+        (("case", "--case", "9999"), "--case: there is no such case"), (("case", "--units", "bogus"), "--units"),
     ):  # fmt: skip
         done = sprag("show", sources[0], *arguments)
         assert (done.code, named in done.err) == (2, True), (arguments, done.err)
+    two = sources[0].with_name("two.json")
+    two.write_text(json.dumps(SPEC))
+    for line, named in (
+        (("export", sources[0], "--units", "bogus"), "--units"),
+        (("compare", *sources, "--x", "nonsense"), "--x"), (("compare", *sources, "--y", "nonsense"), "--y"),
+        (("compare", *sources, "--x", "shaft.load", "--by", "nonsense"), "--by"),
+        (("compare", two, two, "--x", "shaft.load", "--at", "excitation.frequency=9 Hz"), "--at"),
+    ):  # fmt: skip
+        done = sprag(*line)
+        assert (done.code, named in done.err) == (2, True), (line, done.err)
     monkeypatch.setattr("sprag_study.service.views.case_view.see", run)
     done = sprag("show", sources[0], "strobes", "-o", "a.svg", "--language", "xx")
     assert (done.code, "--language: is not a language" in done.err) == (2, True), done.err
@@ -269,6 +285,23 @@ def test_a_view_of_a_spec_is_found_once_for_table_and_file(
         found.clear()
         assert sprag("show", sources[0], "answers", "-o", tmp_path / f"file.{form}").code == 0
         assert found == [True]
+
+
+def test_a_service_finds_a_piped_view_once(
+    sprag: Callable[..., Finished], sources: tuple[Path, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found: list[bool] = []
+    genuine = AnswersView.find
+
+    def find(self: AnswersView, *arguments: Any, **named: Any) -> Any:
+        found.append(True)
+        return genuine(self, *arguments, **named)
+
+    monkeypatch.setattr(AnswersView, "find", find)
+    for options, count in (((), 1), (("--json",), 1), (("-o", tmp_path / "file.csv"), 2)):
+        found.clear()
+        assert sprag("show", sources[1], "answers", *options).code == 0
+        assert len(found) == count, options
 
 
 def test_choices_are_in_the_help_and_completed(sprag: Callable[..., Finished]) -> None:
