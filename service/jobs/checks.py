@@ -91,11 +91,13 @@ def new_study(library: Library, body: Body) -> ParsedSpec:
 def extended_study(library: Library, study_id: str, body: Body, warnings: Sequence[WarningText] = ()) -> ParsedSpec:
     """A study extended by the body of a request, with ``warnings`` about how that was written.
 
-    Raises SpecError and StudyNotFoundError.
+    It is the old one where no case is new, unless it gets another name. Raises SpecError and StudyNotFoundError.
     """
     study = library.store.studies.study(study_id)
-    parsed = parse_extended(accepted(library.store.studies.spec(study_id), study), study, body.data())
-    return replace(parsed, warnings=(*warnings, *parsed.warnings))
+    addition = body.data()
+    parsed = parse_extended(accepted(library.store.studies.spec(study_id), study), study, addition)
+    nothing_new = parsed.study.cases == study.cases and "name" not in addition
+    return replace(parsed, warnings=(*warnings, *parsed.warnings), same_as=study_id if nothing_new else "")
 
 
 def _refuse_without_time(study: Study) -> None:

@@ -59,12 +59,15 @@ class Submission:
     bytes : int
         Rough size of its results.
     order : Order
+    same_as : str
+        See `sprag_study.service.spec.document.ParsedSpec`.
     """
 
     row: dict[str, Any]
     body_hash: str
     bytes: int
     order: Order
+    same_as: str = ""
 
 
 def hash_of(asked: object) -> str:
@@ -82,7 +85,7 @@ def submission(parsed: ParsedSpec, store: Store, order: Order) -> Submission:
         warnings += finish_warnings(parsed.study, seconds, (order.finish_by - order.now).total_seconds())
     size = estimated_bytes(parsed.study)
     row = {**study_row(parsed.spec, parsed.study, store.dispatchers.chunking, warnings), "estimated_bytes": size}
-    return Submission(row, hash_of(asked), size, order)
+    return Submission(row, hash_of(asked), size, order, parsed.same_as)
 
 
 def accept(
@@ -105,13 +108,17 @@ def take_in(
     priority: int = 0,
     run: OpenRun | None = None,
 ) -> StudyRecord:
-    """Store a submission; FaultError when there are too many studies, or no room for its results.
+    """Store a submission, unless a study has all of its cases: then it is that one.
+
+    FaultError when there are too many studies, or no room for its results.
 
     It is the study of ``run``, the due time of a schedule: RunClosedError where this has an outcome by now.
     """
     known = store.studies.of_key(idempotency_key, made.body_hash) if idempotency_key else None
     if known is not None:
         return known
+    if made.same_as:
+        return store.studies.get(made.same_as)
     _require_room(store, made.bytes)
     return store.studies.insert(
         made.row,

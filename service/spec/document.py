@@ -75,12 +75,15 @@ class ParsedSpec:
         JSON Pointer of a clutch given as measured data -> its fit.
     spec : dict
         The user's spec, unchanged.
+    same_as : str
+        Id of a stored study that has all of these cases, which then is not stored again; "" for none.
     """
 
     study: Study
     warnings: tuple[str, ...]
     fits: dict[str, ClutchFit] = field(default_factory=dict)
     spec: dict[str, Any] = field(default_factory=dict)
+    same_as: str = ""
 
 
 def format_of(name: str) -> Format:

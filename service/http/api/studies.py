@@ -232,7 +232,10 @@ async def extend_study(
     priority: Priority = 0,
     finish_by: FinishBy = None,
 ) -> Response:
-    """Submit a study with more values on the axes of an old one, or more cases; only new cases are run."""
+    """Submit a study with more values on the axes of an old one, or more cases; only new cases are run.
+
+    Where none is new, and no name is given, the answer is the old study.
+    """
     record = await work.submit(
         checks.extended_study, study_id, received, key=idempotency_key, priority=priority,
         given=given_options(priority=priority, finish_by=finish_by), finish_by=_finish(context, finish_by),

@@ -19,6 +19,7 @@ from sprag_study.service.http.web.sheet.drawer import with_query
 from sprag_study.service.http.web.study import shown_study
 from sprag_study.service.http.work import Attended
 from sprag_study.service.jobs import checks
+from sprag_study.service.languages import _
 from sprag_study.service.reading.faults import message
 from sprag_study.service.reading.numbers import parse_number
 from sprag_study.service.spec.text import Body
@@ -59,6 +60,8 @@ async def extend(context: Ctx, work: Attended, study_id: StudyId, values: Form) 
         if not error.faults:
             raise
         return await shown_study(context, work, study_id, values, _wrong(values, error.faults))
+    if record.id == study_id:
+        return await shown_study(context, work, study_id, values, {"": [_("The study has all of these cases.")]})
     point = values.get("point", "").strip()
     return RedirectResponse(with_query(f"/studies/{record.id}", [("point", point)] if point else []), status_code=303)
 

@@ -146,6 +146,18 @@ def test_over_http_only_new_cases_are_run(service: Service, spec: dict[str, Any]
     assert service.http.post(f"{API}/studies/st_0/:extend", json=body).status_code == 404
 
 
+def test_nothing_new_makes_no_study(service: Service) -> None:
+    study, body = service.submit(), {"axes": [{"path": "shaft.load", "values": ["100 N*mm"]}]}
+    address = f"{API}/studies/{study}:extend"
+    again = service.http.post(address, json=body)
+    assert (again.status_code, again.json()["id"]) == (202, study)
+    page = service.http.post(f"/studies/{study}/extend", data={"axis:shaft.load": "100 N*mm"})
+    assert (page.status_code, "The study has all of these cases." in page.text) == (422, True)
+    assert len(service.get("/studies")["studies"]) == 1
+    named = service.http.post(address, json={**body, "name": "another"})
+    assert named.json()["id"] != study
+
+
 def test_the_same_key_extends_once(service: Service) -> None:
     study, body = service.submit(), {"axes": [{"path": "shaft.load", "values": [0.123]}]}
     address, key = f"{API}/studies/{study}:extend", {"Idempotency-Key": "once"}
