@@ -96,7 +96,8 @@ def extended_study(library: Library, study_id: str, body: Body, warnings: Sequen
     study = library.store.studies.study(study_id)
     addition = body.data()
     parsed = parse_extended(accepted(library.store.studies.spec(study_id), study), study, addition)
-    nothing_new = parsed.study.cases == study.cases and "name" not in addition
+    named = isinstance(addition, Mapping) and "name" in addition
+    nothing_new = parsed.study.cases == study.cases and not named
     return replace(parsed, warnings=(*warnings, *parsed.warnings), same_as=study_id if nothing_new else "")
 
 
