@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 OTHERS = [code for code in languages.available() if code != languages.ENGLISH]
 #: Texts that are typed as they stand, in every language.
-TYPED = {"--axis shaft.load=0.5,0.7", "cron", "identity", "programs, plain"}
+TYPED = {'"adaptive": ["{first}", "{last}"]', "--axis shaft.load=0.5,0.7", "cron", "identity", "programs, plain"}
 HEADER = "Plural-Forms: nplurals=2; plural=(n != 1);\n"
 
 
