@@ -98,7 +98,9 @@ def extended_study(library: Library, study_id: str, body: Body, warnings: Sequen
     parsed = parse_extended(accepted(library.store.studies.spec(study_id), study), study, addition)
     named = isinstance(addition, Mapping) and "name" in addition
     nothing_new = parsed.study.cases == study.cases and not named
-    return replace(parsed, warnings=(*warnings, *parsed.warnings), same_as=study_id if nothing_new else "")
+    return replace(
+        parsed, warnings=(*warnings, *parsed.warnings), same_as=study_id if nothing_new else "", follows=not named
+    )
 
 
 def _refuse_without_time(study: Study) -> None:
@@ -139,7 +141,8 @@ def longer_study(
         cases = store.rows.cases_of_kind(study_id, **named)
     else:
         cases = np.array(kind, dtype=np.int64)
-    return parse_spec(longer_spec(accepted(store.studies.spec(study_id), study), study, cases, at_most))
+    spec = longer_spec(accepted(store.studies.spec(study_id), study), study, cases, at_most)
+    return replace(parse_spec(spec), follows=True)
 
 
 def narrowed_study(library: Library, study_id: str, steps: int, at: Sequence[tuple[str, str]] = ()) -> ParsedSpec:
@@ -162,7 +165,8 @@ def narrowed_study(library: Library, study_id: str, steps: int, at: Sequence[tup
         cases, indices = cases[indices[axis] == index], tuple(one[indices[axis] == index] for one in indices)
     if not cases.size:
         raise FaultError("wrong-state", "No case of the study has the flag jumped" + (" there." if fixed else "."))
-    return parse_spec(narrowed_spec(accepted(store.studies.spec(study_id), study), study, cases, steps, fixed))
+    spec = narrowed_spec(accepted(store.studies.spec(study_id), study), study, cases, steps, fixed)
+    return replace(parse_spec(spec), follows=True)
 
 
 def selected_study(library: Library, study_id: str, query: ExploreQuery) -> ParsedSpec:

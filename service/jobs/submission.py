@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field, replace
+from itertools import chain, count
+from typing import TYPE_CHECKING, Any, Final
 
 from sprag_study.sentences import Amount, Sentence
 from sprag_study.service.faults import FaultError
 from sprag_study.service.jobs.preview import estimated_bytes, estimated_seconds
 from sprag_study.service.languages import recorded
 from sprag_study.service.schedules.deadline import finish_warnings
+from sprag_study.service.spec.fields import renamed
+from sprag_study.service.storage.studies.listing import names_beginning
 from sprag_study.service.storage.studies.study_row import study_row
 from sprag_study.service.storage.work.room import RESERVE_BYTES
-from sprag_study.worker.limits import MAX_WAITING_STUDIES
+from sprag_study.worker.limits import MAX_NAME_LENGTH, MAX_WAITING_STUDIES
 from sprag_study.worker.planning import most_cases
 
 if TYPE_CHECKING:
@@ -25,6 +28,9 @@ if TYPE_CHECKING:
     from sprag_study.service.storage.schedules.runs import OpenRun
     from sprag_study.service.storage.store import Store
     from sprag_study.service.storage.studies.records import StudyRecord
+
+#: Characters of the longest number behind a name, with its blank.
+_NUMBER: Final = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +84,8 @@ def hash_of(asked: object) -> str:
 def submission(parsed: ParsedSpec, store: Store, order: Order) -> Submission:
     """The submission of ``parsed`` to ``store``, with all its warnings."""
     asked = [parsed.spec, dict(order.given)] if order.given else parsed.spec
+    if parsed.follows:  # not in the hash: the same request has the same key when its study is there
+        parsed = _named_apart(parsed, store)
     warnings = (*parsed.warnings, *store.dispatchers.chunking.warnings(parsed.study))
     if order.finish_by is not None:
         to_run = most_cases(parsed.study) - (0 if order.fresh else store.reuse.count(parsed.study))
@@ -86,6 +94,15 @@ def submission(parsed: ParsedSpec, store: Store, order: Order) -> Submission:
     size = estimated_bytes(parsed.study)
     row = {**study_row(parsed.spec, parsed.study, store.dispatchers.chunking, warnings), "estimated_bytes": size}
     return Submission(row, hash_of(asked), size, order, parsed.same_as)
+
+
+def _named_apart(parsed: ParsedSpec, store: Store) -> ParsedSpec:
+    """The study with a number behind a name that a study has already: *feeder, extended 2*."""
+    name = parsed.study.name
+    names = names_beginning(store.session, name[: MAX_NAME_LENGTH - _NUMBER])
+    numbered = (renamed(name, f" {number}") for number in count(2))
+    free = next(free for free in chain([name], numbered) if free not in names)
+    return replace(parsed, spec={**parsed.spec, "name": free}, study=replace(parsed.study, name=free))
 
 
 def accept(

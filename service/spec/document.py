@@ -77,6 +77,8 @@ class ParsedSpec:
         The user's spec, unchanged.
     same_as : str
         Id of a stored study that has all of these cases, which then is not stored again; "" for none.
+    follows : bool
+        Whether its name follows from that of another study, and gets a number where a study has it already.
     """
 
     study: Study
@@ -84,6 +86,7 @@ class ParsedSpec:
     fits: dict[str, ClutchFit] = field(default_factory=dict)
     spec: dict[str, Any] = field(default_factory=dict)
     same_as: str = ""
+    follows: bool = False
 
 
 def format_of(name: str) -> Format:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from sprag_study.service.spec.labels import StudyChange
+    from sprag_study.service.storage.database.session import Session
 
 #: Between tags. No folded text has it, nor the line feed between name, tags and notes.
 _BESIDE_TAG: Final = "\x1f"
@@ -98,6 +99,14 @@ class StudyFilter:
             found.append(c.search.contains(tag_text(self.tag), autoescape=True))
         found += [c[name] == value for name in ("owner", "model") if (value := getattr(self, name))]
         return found
+
+
+def names_beginning(session: Session, text: str) -> set[str]:
+    """The names of studies that begin with a text, those of deleted studies aside."""
+    c = STUDIES.c
+    with session.read() as connection:
+        query = sa.select(c.name).where(c.deleted_at.is_(None), c.name.startswith(text, autoescape=True))
+        return set(connection.execute(query.distinct()).scalars())
 
 
 def sort_key(order: StudyOrder, *, on_server: bool) -> tuple[sa.ColumnElement[Any], bool]:

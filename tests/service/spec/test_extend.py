@@ -158,6 +158,19 @@ def test_nothing_new_makes_no_study(service: Service) -> None:
     assert named.json()["id"] != study
 
 
+def test_studies_that_follow_have_names_of_their_own(service: Service) -> None:
+    address, names = f"{API}/studies/{service.submit()}:extend", []
+    for load in (0.7, 0.8, 0.9):
+        body, key = {"axes": [{"path": "shaft.load", "values": [load]}]}, {"Idempotency-Key": f"load-{load}"}
+        first, again = (service.http.post(address, json=body, headers=key).json() for _ in range(2))
+        assert first["id"] == again["id"]
+        names.append(first["name"])
+        assert service.get(f"/studies/{first['id']}")["spec"]["name"] == first["name"]
+    assert names == [names[0], f"{names[0]} 2", f"{names[0]} 3"]
+    chosen = [service.http.post(address, json={**body, "name": "more"}).json()["name"] for _ in range(2)]
+    assert chosen == ["more", "more"]
+
+
 def test_the_same_key_extends_once(service: Service) -> None:
     study, body = service.submit(), {"axes": [{"path": "shaft.load", "values": [0.123]}]}
     address, key = f"{API}/studies/{study}:extend", {"Idempotency-Key": "once"}
