@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import pickle
+import re
 import subprocess
 import sys
 import tempfile
@@ -129,9 +130,14 @@ def test_what_a_service_refuses_is_refused_here(pair: tuple[Study, Study], ask: 
     assert refusals[0] == refusals[1]
 
 
+def _unnumbered(spec: dict[str, Any]) -> dict[str, Any]:
+    """A spec without the number that tells its name from those of other studies of its database."""
+    return {**spec, "name": re.sub(r" \d+$", "", spec["name"])}
+
+
 def test_values_of_numpy_are_taken_as_a_service_takes_them(pair: tuple[Study, Study]) -> None:
     there, here = (study.extend([{"path": LOAD, "values": np.array([3.0, 4.0])}]).detail() for study in pair)
-    assert (there["spec"], there["cases"]) == (here["spec"], here["cases"])
+    assert (_unnumbered(there["spec"]), there["cases"]) == (_unnumbered(here["spec"]), here["cases"])
 
 
 def test_pictures_are_those_of_a_service(pair: tuple[Study, Study], tmp_path: Path) -> None:
@@ -148,7 +154,7 @@ def test_further_studies_are_made_as_a_service_makes_them(pair: tuple[Study, Stu
         lambda study: study.extend([{"path": LOAD, "values": ["3 N*m"]}]),
     ):
         there, here = (further(study).detail() for study in pair)
-        assert (there["spec"], there["cases"]) == (here["spec"], here["cases"])
+        assert (_unnumbered(there["spec"]), there["cases"]) == (_unnumbered(here["spec"]), here["cases"])
     with pytest.raises(RefusedError) as refused:
         pair[1].pause()
     assert (refused.value.status, refused.value.code) == (405, "method-not-allowed")
