@@ -144,7 +144,7 @@ def test_what_was_typed_outlives_the_session(house: House, tab: Page) -> None:
     log_in(tab, secret)
     tab.get_by_role("button", name="Continue").click()
     tab.wait_for_url("**/new")
-    assert tab.get_by_role("textbox", name="Load").first.input_value() == "1.25"
+    expect(tab.get_by_role("textbox", name="Load").first).to_have_value("1.25")
 
 
 def test_a_token_to_look_sees_every_page_and_may_change_nothing(house: House, tab: Page) -> None:
