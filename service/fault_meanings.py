@@ -92,8 +92,6 @@ KIND_MEANINGS: Final[dict[Kind, str]] = {
     "unknown-tables": "The database has tables of another program, which are not moved.",
     "unreachable": "No service answered at this address.",
     "unsupported-database": "This kind, version or place of a database is not supported.",
-    "user-exists": "The name belongs to a user already, or did.",
-    "user-not-found": "No user has this name.",
     "write-failed": "The output cannot be written.",
     "wrong-revision": "The database has another revision than this program; the message names the command to run.",
 }

@@ -172,8 +172,6 @@ Kind = Literal[
     "unknown-tables",
     "unreachable",
     "unsupported-database",
-    "user-exists",
-    "user-not-found",
     "write-failed",
     "wrong-revision",
 ]

@@ -12,7 +12,6 @@ from functools import cache
 from typing import Annotated, Any, Final, cast
 
 import typer
-from typer._click.core import ParameterSource
 from typer.core import TyperGroup
 from typer.main import get_command
 
@@ -101,7 +100,8 @@ def _every_command(
     ] = False,
 ) -> None:
     """Options of every command; typer shows the application's own help instead of this text."""
-    typed = context.get_parameter_source("language") is ParameterSource.COMMANDLINE
+    source = context.get_parameter_source("language")
+    typed = source is not None and source.name == "COMMANDLINE"
     CURRENT.set(Common(server, token, as_json, language if typed else None))
 
 
