@@ -8,37 +8,21 @@ few of such drives (tests/engine/vibration_drive/test_drag.py).
 
 from __future__ import annotations
 
-import argparse
 import sys
 
+from benchmarks.compared_drives import compare_all
 from tests.engine.vibration_drive.test_against_scipy import compare
 from tests.engine.vibration_drive.test_drag import damped, resisted
 
 _CLOSELY = 1e-9
 
 
-def main() -> int:
-    """Compare so many drives, every third of them with literal resets."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--drives", type=int, default=300)
-    drives = parser.parse_args().drives
-    agree = sensitive = 0
-    wrong: list[str] = []
-    for number in range(drives):
-        machines = damped if number % 2 else resisted
-        (columns,) = machines(1 + number % 3 // 2, 10_000 + number, 1)
-        try:
-            concluded = compare(columns, "literal" if number % 3 == 1 else "contact", _CLOSELY)
-        except AssertionError as error:
-            wrong.append(f"{machines.__name__} {number}: {str(error).splitlines()[0]}")
-            continue
-        agree += concluded
-        sensitive += not concluded
-    print(f"{agree} of {drives} drives agree, {sensitive} are too sensitive, {len(wrong)} differ")
-    for line in wrong:
-        print(line)
-    return 1 if wrong else 0
+def compare_drag(number: int) -> bool:
+    """Compare a drive; every third of them has literal resets."""
+    machines = damped if number % 2 else resisted
+    (columns,) = machines(1 + number % 3 // 2, 10_000 + number, 1)
+    return bool(compare(columns, "literal" if number % 3 == 1 else "contact", _CLOSELY))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(compare_all(__doc__, compare_drag))
