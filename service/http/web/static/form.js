@@ -44,6 +44,7 @@ const reveal = (element) => { for (let part = element; (part = part.parentElemen
 const check = async () => {
   const mine = ++latest, left = typed, panel = document.getElementById("panel");
   old = true;
+  delete form.dataset.checked;
   panel.classList.toggle("stale", panel.querySelector("[data-cases]") !== null); // until it matches the current input
   let found = null;
   try {
@@ -297,7 +298,7 @@ document.addEventListener("click", (event) => {
   const link = event.target.closest?.("#study-form a[href^='#/']");
   if (link && lead(link.getAttribute("href"))) event.preventDefault();
 });
-if ("unchecked" in form.dataset) check();
+if (!("checked" in form.dataset)) check();
 const draft = sprag.drafts.waiting(form, Boolean(refused));
 if (draft) sprag.drafts.offer(form, draft, (fields) => newShape([], new URLSearchParams(fields)));
 document.addEventListener("sprag:found", () => { if (old) check(); });

@@ -244,7 +244,7 @@ def test_a_drive_of_ones_own_with_three_axes(visitor: Visitor, office: Office) -
     page, actions = visitor.page, 0
     page.goto("/new")
     expect(page.locator("#go")).to_contain_text("Run 1 case")
-    # A page that came before the service could draw is made again, which would interrupt the counting.
+    # A page that came before the service could check and draw is made again, which would interrupt the counting.
     expect(page.locator("#study-form[data-checked]:has(.picture svg)")).to_be_attached()
     assert stops(page) <= 20
     assert page.evaluate(WORDS) <= 300
