@@ -161,10 +161,25 @@ def visitor(browser: Browser, office: Office, request: pytest.FixtureRequest) ->
         yield found
 
 
+@contextmanager
+def online(service: Service, port: int = 0) -> Iterator[str]:
+    """The address of a server of a service, which is asked by that alone meanwhile.
+
+    An application with two event loops at once would not wake what waits in one of them.
+    """
+    before = service.http
+    with served(service.app, port) as address, httpx.Client(base_url=address, timeout=SECONDS, trust_env=False) as http:
+        service.http = http
+        try:
+            yield address
+        finally:
+            service.http = before
+
+
 @pytest.fixture
 def open_tab(service: Service, browser: Browser) -> Iterator[Callable[..., Page]]:
     """Opens a tab at the service of this test, in a context with the options of the call."""
-    with served(service.app) as address, ExitStack() as contexts:
+    with online(service) as address, ExitStack() as contexts:
 
         def opened(**options: Any) -> Page:
             context = contexts.enter_context(browser.new_context(base_url=address, **options))

@@ -19,8 +19,8 @@ from sprag_study.service.jobs.reports.watchdog import LateRun
 from sprag_study.service.storage.schedules.runs import ExpectedRun
 from tests.acceptance.processes import SECONDS
 from tests.service.conftest import in_process
+from tests.service.http.web.conftest import online
 from tests.service.timed_spec import SPEC
-from tests.serving import served
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -111,17 +111,12 @@ def kept(page: Page, name: str) -> None:
         expect(page.locator('[name="/name"]')).to_have_value("Half a na")
 
 
-def asked(address: str) -> httpx.Client:
-    """A client that asks as pages do: an application with two event loops at once would not wake what waits in one."""
-    return httpx.Client(base_url=address, timeout=SECONDS, trust_env=False)
-
-
 def test_every_kind_of_page_outlives_a_stop_of_the_service(
     browser: Browser, settings: Settings, connect: Callable[..., httpx.Client]
 ) -> None:
     """Every page finds the service again; lists show what changed, and what somebody began is kept."""
     port = free_port()
-    with in_process(settings, connect) as service, served(service.app, port) as address, asked(address) as service.http:
+    with in_process(settings, connect) as service, online(service, port) as address:
         study = service.submit({**SPEC, "name": "Before"})
         service.fill(study, range(4))
         service.http.post(f"/api/v1/studies/{study}:pause")
@@ -150,7 +145,7 @@ def test_every_kind_of_page_outlives_a_stop_of_the_service(
         if name == "form":
             page.locator('[name="/axes/0/values"]').fill("20 to 35 in 7")  # learns it from its next request
         expect(page.get_by_role("alert").filter(has_text=LOST)).to_be_visible()
-    with in_process(settings, connect) as service, served(service.app, port), asked(address) as service.http:
+    with in_process(settings, connect) as service, online(service, port):
         service.submit({**SPEC, "name": "After"})
         service.http.post(f"/api/v1/studies/{study}:cancel")
         service.store.work.settle(service.store.work.take_over("the second"), service.store.studies.get(study).number)
