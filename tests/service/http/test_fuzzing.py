@@ -22,12 +22,20 @@ if TYPE_CHECKING:
     from sprag_study.service.settings import Settings
     from tests.service.conftest import Service
 
-#: A spec has thousands of bounds, and a report takes a second to print: left to ``python -m benchmarks.fuzz``.
+#: A spec has thousands of bounds, and a report takes a second to print: ``python -m benchmarks.fuzz`` has all.
 HEAVY = {
     **dict.fromkeys(
         ("create_study", "preview_study", "extend_study", "create_schedule", "change_schedule"), ("coverage",)
     ),
     "get_report": ("examples", "coverage"),
+    # Their questions are read by the code that reads those of `get_diagram`, `get_curves` and `get_map`.
+    **dict.fromkeys(
+        (
+            *("get_transient", "get_forces", "get_basin", "get_trajectory", "get_section", "get_branch", "get_strobes"),
+            *("get_duty", "get_engagements", "get_yield", "get_exploration", "get_ribbon", "get_answers", "get_front"),
+        ),
+        ("coverage",),
+    ),
 }
 #: What cases do is not computed here, and no study is of settled motion, has a goal or starts, or is a calibration.
 NEVER_SERVED = {
