@@ -8,6 +8,9 @@ MAX_AXES: Final = 16
 MAX_COLUMNS: Final = 256
 #: Derived parameters of one study.
 MAX_DERIVED: Final = 100
+#: Quantities of one study, and characters of the name of one.
+MAX_QUANTITIES: Final = 50
+MAX_QUANTITY_NAME: Final = 40
 #: Parameters with tolerances of one study, and its drawn drives.
 MAX_TOLERANCES: Final = 1_000
 MAX_DRIVES: Final = 100_000

@@ -306,4 +306,4 @@ def taken(study: Study, cases: Cases) -> Study:
 
 def no_cases(study: Study) -> models.ChunkResult:
     """The result of running no case of ``study``."""
-    return models.ChunkResult(0, [], [], np.empty((0, len(models.study_results(study)))))
+    return models.ChunkResult(0, [], [], np.empty((0, len(models.model_results(study)))))

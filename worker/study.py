@@ -16,6 +16,7 @@ from sprag_study.worker.axis import SAME_VALUE, Axis
 from sprag_study.worker.directions import DOWN, SWEEP, UP
 from sprag_study.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES, MAX_COLUMNS
 from sprag_study.worker.models.formulas import evaluate
+from sprag_study.worker.models.quantities import Quantity
 from sprag_study.worker.packed import packed, unpacked
 from sprag_study.worker.spread import DRIVE, Spread, Tolerance
 
@@ -58,6 +59,8 @@ class Study:
         A path of the axis along which each case starts from the settled motion of its neighbour
         (`sprag_study.worker.sweeps`). The axis with the path `SWEEP`, the last one, then gives the direction of each
         case.
+    quantities : tuple of Quantity
+        Formulas over parameters and results that it has beside the results of its model. They change no row.
 
     Raises
     ------
@@ -76,6 +79,7 @@ class Study:
     derive: dict[str, str] = field(default_factory=dict)
     spread: Spread | None = None
     sweep: str | None = None
+    quantities: tuple[Quantity, ...] = ()
 
     def __post_init__(self) -> None:
         if self.combine not in get_args(Combine):
@@ -322,6 +326,7 @@ class Study:
             **({"derive": dict(self.derive)} if self.derive else {}),
             **({} if self.spread is None else {"spread": self.spread.to_json()}),
             **({} if self.sweep is None else {"sweep": self.sweep}),
+            **({"quantities": {one.name: one.to_json() for one in self.quantities}} if self.quantities else {}),
         }
 
     def to_text(self) -> str:
@@ -349,6 +354,7 @@ class Study:
             derive=dict(data.get("derive", {})),
             spread=Spread.from_json(data["spread"]) if data.get("spread") else None,
             sweep=data.get("sweep"),
+            quantities=tuple(Quantity.from_json(*item) for item in data.get("quantities", {}).items()),
         )
 
     def physics_hash(self, engine_version: str) -> str:

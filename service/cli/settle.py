@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag_study.service.storage.studies.records import RowBlock
-    from sprag_study.worker.models import ChunkResult, ResultInfo
+    from sprag_study.worker.models import ChunkResult
     from sprag_study.worker.study import Study
 
 #: Cases that are settled together: enough to fill the engine, few enough to show progress.
@@ -110,7 +110,7 @@ def _blocks(study: Study, cases: list[int]) -> list[RowBlock]:
     """The rows of the cases, run here; those of a case with many starts side by side."""
     import numpy as np
 
-    from sprag_study.worker.models import run_chunk, study_results
+    from sprag_study.worker.models import run_chunk
     from sprag_study.worker.reuse import taken
 
     if study.sweep is not None:
@@ -120,34 +120,43 @@ def _blocks(study: Study, cases: list[int]) -> list[RowBlock]:
         for first in range(0, len(cases), _BATCH):
             part = np.array(cases[first : first + _BATCH], dtype=np.int64)
             done = run_chunk(taken(study, part) if study.axes else study, 0, part.size)
-            blocks.append(_block(study_results(study), part, done))
+            blocks.append(_block(study, part, done))
             update(first + part.size, len(cases), "")
     return blocks
 
 
-def _block(infos: tuple[ResultInfo, ...], cases: NDArray[np.int64], done: ChunkResult) -> RowBlock:
+def _block(study: Study, cases: NDArray[np.int64], done: ChunkResult) -> RowBlock:
     """The rows of a run of these cases, in their order: those of a case one after the other."""
     import numpy as np
 
-    from sprag_study.service.storage.studies.records import RowBlock
     from sprag_study.worker.models import OK
 
     if done.further is None:
-        return RowBlock(infos, cases, done.endings, done.flags, done.values)
+        return _rows(study, cases, done.endings, done.flags, done.values)
     places = np.concatenate([np.arange(cases.size), done.further.of])
     order = np.argsort(places, kind="stable")
     endings = [*done.endings, *[OK] * len(done.further.of)]
     flags = [*done.flags, *done.further.flags]
     values = np.concatenate([done.values, done.further.values])
-    return RowBlock(infos, cases[places[order]], [endings[k] for k in order], [flags[k] for k in order], values[order])
+    return _rows(study, cases[places[order]], [endings[k] for k in order], [flags[k] for k in order], values[order])
+
+
+def _rows(
+    study: Study, cases: NDArray[np.int64], endings: list[str], flags: list[str], values: NDArray[np.float64]
+) -> RowBlock:
+    """Rows with the quantities of their study."""
+    from sprag_study.service.storage.studies.records import RowBlock
+    from sprag_study.worker.models import model_results, study_results, with_quantities
+
+    values = with_quantities(study, model_results(study), cases, values)
+    return RowBlock(study_results(study), cases, endings, flags, values)
 
 
 def _of_lines(study: Study, cases: NDArray[np.int64]) -> RowBlock:
     """The rows of cases of a sweep: whole lines are run, because every case needs those before it."""
     import numpy as np
 
-    from sprag_study.service.storage.studies.records import RowBlock
-    from sprag_study.worker.models import run_chunk, study_results
+    from sprag_study.worker.models import run_chunk
     from sprag_study.worker.reuse import taken
     from sprag_study.worker.sweeps import LineOrder
 
@@ -156,7 +165,7 @@ def _of_lines(study: Study, cases: NDArray[np.int64]) -> RowBlock:
     done = run_chunk(taken(study, every), 0, every.size)
     rows = np.searchsorted(every, cases)
     endings, flags = ([column[row] for row in rows.tolist()] for column in (done.endings, done.flags))
-    return RowBlock(study_results(study), cases, endings, flags, done.values[rows])
+    return _rows(study, cases, endings, flags, done.values[rows])
 
 
 def _show(block: RowBlock, starts: int) -> None:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 #: Parts of a spec that describe the machine and its run; the rows themselves contain the axes.
-_GIVEN: Final = ("base", "derive", "run", *SPREAD)
+_GIVEN: Final = ("base", "derive", "run", "quantities", *SPREAD)
 
 
 @dataclass(frozen=True, slots=True)

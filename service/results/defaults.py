@@ -203,9 +203,10 @@ def _drawn(study: Study) -> tuple[str, ...]:
 
 
 def main_results(study: Study) -> tuple[str, ...]:
-    """The main results according to the model; the first ones where it names none."""
-    known = models.results_by_name(study)
-    return tuple(filter(known.__contains__, models.presentation_of(study).main)) or tuple(known)[:_MOST_MAIN]
+    """The main results according to the model, the first ones where it names none, and all quantities of the study."""
+    known = [info.name for info in models.model_results(study)]
+    main = tuple(filter(known.__contains__, models.presentation_of(study).main)) or tuple(known)[:_MOST_MAIN]
+    return (*main, *(one.name for one in study.quantities))
 
 
 def varying_axes(study: Study) -> list[Axis]:

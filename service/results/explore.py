@@ -224,10 +224,11 @@ def plan_of(study: Study, query: ExploreQuery, further: Sequence[ResultInfo] = (
 
 
 def usual_quantities(study: Study, infos: Sequence[ResultInfo]) -> tuple[str, ...]:
-    """The quantities that are shown first: the parameters that vary, and numeric results of the model's table."""
+    """What is shown first: the parameters that vary, the study's quantities, and numbers of the model's table."""
+    asked = [one.name for one in study.quantities]
     columns = [name for name in models.presentation_of(study).columns if _numeric(infos, name)]
-    results = columns or [info.name for info in infos if info.kind != "category"][:5]
-    return (*own_paths(study), *results)[:MOST_SHOWN]
+    results = columns or [info.name for info in infos if info.kind != "category" and info.name not in asked][:5]
+    return (*own_paths(study), *asked, *results)[:MOST_SHOWN]
 
 
 def _quantities(study: Study, infos: Sequence[ResultInfo]) -> dict[str, str]:

@@ -122,20 +122,24 @@ class StudyAnswers:
 
 
 def answers_of_model(study: Study) -> tuple[Answer, ...]:
-    """The answers that the model names and the study has; extremes of the drawn results of a model that names none."""
+    """The answers that the model names and the study has; extremes of the drawn results of a model that names none.
+
+    Behind them are the extremes of each quantity of the study.
+    """
     names = models.results_by_name(study)
     named = tuple(one for one in models.presentation_of(study).answers if one.result in names)
-    if named:
-        return named
+    drawn = [] if named else [name for name in drawn_results(study) if name in names][:2]
+    return (*named, *(one for name in (*drawn, *(one.name for one in study.quantities)) for one in _extremes(name)))
+
+
+def _extremes(name: str) -> tuple[Answer, ...]:
+    """The largest and the smallest value of a result as answers."""
     kinds: tuple[tuple[Literal["largest", "smallest"], str], ...] = (
         ("largest", N_("Largest {name}")),
         ("smallest", N_("Smallest {name}")),
     )
-    drawn = [name for name in drawn_results(study) if name in names][:2]
     return tuple(
-        Answer(f"{kind}_{name}", Phrase(text, name=Name(name, within=True)), name, kind)
-        for name in drawn
-        for kind, text in kinds
+        Answer(f"{kind}_{name}", Phrase(text, name=Name(name, within=True)), name, kind) for kind, text in kinds
     )
 
 

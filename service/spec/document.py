@@ -22,6 +22,7 @@ from sprag_study.service.spec.kinds.registry import CASES, WITH_CASES
 from sprag_study.service.spec.kinds.tolerances import warn_of_invalid_drives
 from sprag_study.service.spec.machine.registry import part_of
 from sprag_study.service.spec.node import Node
+from sprag_study.service.spec.quantities import QUANTITIES, read_quantities
 from sprag_study.service.spec.report import Report, SpecError
 from sprag_study.service.spec.text import Format, load_spec
 from sprag_study.worker import models
@@ -53,6 +54,7 @@ SPEC: Final = Record(
         "base": {"type": "object", "description": "the machine that every case begins from"},
         "derive": DERIVE,
         "run": {"type": "object"},
+        "quantities": QUANTITIES,
         **CASES.fields,
         **{name: field for kind in WITH_CASES for name, field in kind.fields.items()},
     },
@@ -123,6 +125,8 @@ def parse_spec(data: object, told: Sequence[str] = ()) -> ParsedSpec:
     draft.run = part.read_run(spec["run"], axes, combine)
     steps += [kind.read(draft) for kind in WITH_CASES]
     part.check(report, machine, axes or (), combine)
+    report.raise_if_any()
+    draft.quantities = read_quantities(draft)
     report.raise_if_any()
     for finish in filter(None, steps):
         finish()

@@ -9,8 +9,8 @@ for an angle. A factor pi is taken as the conversion by hand.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Final
 
@@ -18,7 +18,8 @@ from sprag_study.sentences import Part, Sentence, Typed, joined, plural
 from sprag_study.service.faults import ClauseError
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.cyrillic import latin
-from sprag_study.service.reading.units import QuantityError, is_unit, measure, plain_signs, to_float
+from sprag_study.service.reading.quantities import KINDS
+from sprag_study.service.reading.units import PERCENT, QuantityError, is_unit, measure, plain_signs, to_float
 from sprag_study.worker.models.formulas import MAX_LENGTH, RESERVED, Expression, ExpressionError, Node
 
 #: Powers of gram, meter, second and radian, of hertz ("cycle") and of the number pi; None for the number 0, which has
@@ -105,6 +106,76 @@ def read_formula(text: str, units: dict[str, str], unit: str) -> Formula:
     FormulaError
         When it cannot be read, uses something else, or its value is of another dimension.
     """
+    formula, found, rooted = _read(text, units)
+    wanted = _powers(unit)
+    _require(found, unit)
+    unmarked = found is not None and not any(found.get(name) for name in _BESIDE)
+    return replace(formula, angular=rooted and unmarked and _cycles(wanted) == 1)
+
+
+def read_quantity(text: str, units: dict[str, str], unit: str | None = None) -> tuple[Formula, str]:
+    """Read the formula of a quantity, whose unit follows from it.
+
+    Parameters
+    ----------
+    text, units : as of `read_formula`; the names of results and of other quantities are among those of ``units``, too
+    unit : a unit of the dimension that its value must have, which also tells quantities of one dimension apart, such
+        as an energy from a torque; by default any dimension will do
+
+    Returns
+    -------
+    Formula
+    str
+        SI unit of its value; "1" for a plain number, "%" where ``unit`` says so.
+
+    Raises
+    ------
+    FormulaError
+        As `read_formula`; where ``unit`` is none; and where the unit of the value has powers that are not whole.
+    """
+    formula, powers, _ = _read(text, units)
+    if unit is None:
+        return formula, _si_unit(powers, [units[name] for name in sorted(formula.uses)])
+    typed = unit.strip()
+    if typed in PERCENT:
+        _require(powers, "1")
+        return formula, "%"
+    try:
+        _require(powers, typed)
+    except QuantityError as error:
+        raise FormulaError(error.code, Sentence("unit '{unit}' {error}", unit=typed, error=error.message)) from None
+    kind = next((str(kind.unit) for kind in KINDS if typed in (kind.unit, *kind.others)), None)
+    factor, wanted = _measured(typed)
+    return formula, kind or (latin(plain_signs(typed)) if factor == 1 else _si_unit(wanted, []))
+
+
+def _si_unit(powers: Powers, used: Sequence[str]) -> str:
+    """The SI unit of these powers as quantities are shown in it.
+
+    Of several names of a dimension it is the one among the units ``used`` in the formula; without such it is that of an
+    energy where a power or an energy is used, otherwise that of a torque.
+    """
+    there = _without_angle(powers or {})
+    angle = (powers or {}).get("radian", Fraction())
+    if not there:
+        return "rad" if angle == 1 and not _cycles(powers or {}) else "1"
+    if any(power.denominator > 1 for power in (*there.values(), angle)):
+        message = Sentence("gives {unit}, expected a unit of whole powers", unit=_text(there | {"radian": angle}))
+        raise FormulaError("wrong-unit", message)
+    if _per_second(there):
+        return "rad/s" if angle == 1 else "Hz" if _cycles(powers or {}) == 1 else "1/s"
+    kinds = [str(kind.unit) for kind in KINDS]
+    energy = ["J"] if not {"W", "J"}.isdisjoint(used) else []
+    simple = [unit for unit in dict.fromkeys(used) if not {"*", "/", "1"}.intersection(unit)]
+    quotients = [f"{above}/{below}" for above in dict.fromkeys((*used, *energy)) for below in simple]
+    measured = [(name, _powers(name)) for name in (*used, *energy, *kinds, *quotients)]
+    alike = [(name, own) for name, own in measured if _without_angle(own) == there]
+    exact = [name for name, own in alike if own.get("radian", Fraction()) == angle]
+    return next(iter((*exact, *(name for name, _ in alike))), None) or str(_text(there | {"radian": angle}))
+
+
+def _read(text: str, units: dict[str, str]) -> tuple[Formula, Powers, bool]:
+    """A formula, the unit of its value, and whether a root in it is a time or one over it."""
     if len(text) > MAX_LENGTH:
         message = plural(
             "is longer than {count} character", "is longer than {count} characters", MAX_LENGTH, count=str(MAX_LENGTH)
@@ -117,12 +188,15 @@ def read_formula(text: str, units: dict[str, str], unit: str) -> Formula:
         raise FormulaError("invalid-formula", scan.located(error)) from None
     dimensions = _Dimensions(scan, units)
     found = dimensions.of(expression.root)
+    return Formula(scan.converted, expression.used), found, dimensions.rooted
+
+
+def _require(found: Powers, unit: str) -> None:
+    """Raise FormulaError where a value is not of the dimension of ``unit``."""
     wanted = _powers(unit)
     if not _alike(found, wanted):
         parts: dict[str, Part] = {"unit": _text(found), "expected": Typed(unit), "hint": _hint(found, wanted)}
         raise FormulaError("wrong-unit", Sentence("gives {unit}, expected {expected}{hint}", **parts))
-    unmarked = found is not None and not any(found.get(name) for name in _BESIDE)
-    return Formula(scan.converted, expression.used, dimensions.rooted and unmarked and _cycles(wanted) == 1)
 
 
 class _Scan:

@@ -57,9 +57,9 @@ class Store:
         self.alerts, self.dispatchers = Alerts(session, clock), Dispatchers(session, clock, chunking)
         orders = Orders(session, clock)
         self.digests = Digests(session, clock, orders)
-        self.rows = Rows(session, clock, orders, self.digests)
-        self.reuse = Reuse(session, clock, orders, self.digests)
         self.studies = Studies(session, clock, self.people, self.dispatchers, orders, self.digests)
+        self.rows = Rows(session, clock, orders, self.digests, self.studies)
+        self.reuse = Reuse(session, clock, orders, self.digests)
         self.purging = Purging(session, clock, self.studies)
         self.times = TimesByStage(session, clock)
         self.work = Work(

@@ -124,7 +124,7 @@ class Service:
 
 def made_up(study: Study) -> ChunkResult:
     """Results of every case, random doubles of many sizes; every fifth case failed, every fourth has a flag."""
-    infos = models.study_results(study)
+    infos = models.model_results(study)
     random = np.random.default_rng(7)
     values = np.empty((study.cases, len(infos)))
     # Results that are added later leave the numbers of the others as they are.

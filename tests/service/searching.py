@@ -46,7 +46,7 @@ def rows_of(study: Study, cases: range) -> ChunkResult:
         "shaft.speed.mean": 4000.0 * amplitude,
     }
     nothing = np.zeros(len(cases))
-    values = np.stack([named.get(info.name, nothing) for info in models.study_results(study)], axis=1)
+    values = np.stack([named.get(info.name, nothing) for info in models.model_results(study)], axis=1)
     failed = (frequency > 35.0) & (columns["shaft.inertia"] < 0.0015)
     values[failed] = np.nan
     endings = ["chatter" if bad else models.OK for bad in failed]

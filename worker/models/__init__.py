@@ -65,6 +65,7 @@ from sprag_study.worker.models.common import (
 )
 from sprag_study.worker.models.model import Model
 from sprag_study.worker.models.presentation import Panel, Presentation, Reference
+from sprag_study.worker.models.quantities import Quantities, Quantity, numeric, with_quantities
 from sprag_study.worker.models.registry import all_models, model_names, model_of, register, unregister
 from sprag_study.worker.models.shares import SHARE, Share, with_shares
 from sprag_study.worker.models.tasks import chunk_task, run_chunk, run_task
@@ -136,6 +137,8 @@ __all__ = [
     "Parameter",
     "Portrait",
     "Presentation",
+    "Quantities",
+    "Quantity",
     "Reference",
     "ResultInfo",
     "Run",
@@ -171,7 +174,9 @@ __all__ = [
     "mark_of",
     "model_names",
     "model_of",
+    "model_results",
     "numbered_by",
+    "numeric",
     "parameter_catalogue",
     "parameters_of",
     "prepare",
@@ -202,6 +207,7 @@ __all__ = [
     "variants",
     "warm_up",
     "with_half_widths",
+    "with_quantities",
 ]
 
 VIBRATION_DRIVE = vibration_drive.MODEL
@@ -292,9 +298,14 @@ def result_catalogue(model: str) -> tuple[ResultInfo, ...]:
     return with_shares(known.result_catalogue(), known.presentation.shares)
 
 
-def study_results(study: Study) -> tuple[ResultInfo, ...]:
-    """Every result of the cases of ``study``."""
+def model_results(study: Study) -> tuple[ResultInfo, ...]:
+    """The results that the model of ``study`` gives, in the order of the columns of `ChunkResult.values`."""
     return result_infos(study.model, variant_of(study))
+
+
+def study_results(study: Study) -> tuple[ResultInfo, ...]:
+    """Every result of the cases of ``study``: those of its model, then its quantities."""
+    return (*model_results(study), *(one.info for one in study.quantities))
 
 
 def results_by_name(study: Study) -> dict[str, ResultInfo]:

@@ -160,6 +160,7 @@ class Studies(Draft):
         name: str | None = None,
         derive: Mapping[str, Any] | None = None,
         run: Mapping[str, Any] | None = None,
+        quantities: Mapping[str, Any] | None = None,
         combine: Literal["grid", "zip", "union"] | None = None,
         exclude: Sequence[Any] | None = None,
         tolerances: Entries | None = None,
@@ -178,6 +179,9 @@ class Studies(Draft):
             Parameters that follow from others in every case, by path: formulas of other parameters, of numbers with
             their units and of functions; `*` stands for every pendulum or step.
         run : values, optional
+        quantities : values, optional
+            What is asked about beside the results of the model, by name: formulas of parameters and results of a case,
+            of numbers with their units, of functions and of other quantities; each is a result like any other.
         combine : values, optional
             Grid: every combination of the axes (the first varies slowest); zip: the axes side by side; union: one after
             the other, what does not vary being as in the base, each case once.
@@ -200,6 +204,7 @@ class Studies(Draft):
             name=name,
             derive=derive,
             run=run,
+            quantities=quantities,
             combine=combine,
             exclude=exclude,
             tolerances=self._entries(tolerances, "plus_minus"),

@@ -14,6 +14,7 @@ from sprag_study.worker.study import Axis, Combine, Study
 if TYPE_CHECKING:
     from sprag_study.service.spec.described import Field
     from sprag_study.service.spec.node import Node
+    from sprag_study.worker.models import Quantity
     from sprag_study.worker.spread import Spread
 
 
@@ -40,6 +41,7 @@ class Draft:
     plan: dict[str, Any] | None = None
     spread: Spread | None = None
     sweep: str | None = None
+    quantities: tuple[Quantity, ...] = ()
 
     @property
     def cases(self) -> int:
@@ -60,7 +62,7 @@ class Draft:
         base = {path: machine.values[path] + 0.0 for path in sorted(machine.values)}
         return Study(
             self.model, self.name, base, self.run, self.axes or (), self.combine, machine.structure, self.plan,
-            machine.derive, self.spread, self.sweep,
+            machine.derive, self.spread, self.sweep, self.quantities,
         )  # fmt: skip
 
 

@@ -31,7 +31,9 @@ if TYPE_CHECKING:
     from sprag_study.service.storage.database.session import Session
     from sprag_study.service.storage.rows.digests import Digests
     from sprag_study.service.storage.rows.order import Orders
+    from sprag_study.service.storage.studies.studies import Studies
     from sprag_study.worker.arrays import Floats, Ints
+    from sprag_study.worker.models import Quantities
     from sprag_study.worker.ports import Clock
 
 #: Rows of one block of a stream.
@@ -88,14 +90,16 @@ class _Counted:
 class Rows(Part):
     """Rows of finished cases, and the cases that a cancelled study never ran, which have no rows in the database.
 
+    They have the results of the model, as they are stored, and the quantities of the study, computed from these.
+
     What answers are made of is looked over before (`Digests.require_undamaged`): `page`, `case`, `of_case`, `for_cases`
     and `columns` raise DatabaseError where rows changed since they were stored. Exports look over the whole study, and
     then use `blocks`.
     """
 
-    def __init__(self, session: Session, clock: Clock, orders: Orders, digests: Digests) -> None:
+    def __init__(self, session: Session, clock: Clock, orders: Orders, digests: Digests, studies: Studies) -> None:
         super().__init__(session, clock)
-        self._orders, self._digests = orders, digests
+        self._orders, self._digests, self._studies = orders, digests, studies
         self._counted: LRUCache[str, _Counted] = LRUCache(_MOST_COUNTED)
         self._counting = Lock()
 
@@ -106,7 +110,8 @@ class Rows(Part):
         """
         with self.session.read() as connection:
             rows = _rows(connection, study_id)
-            return _block(rows.infos, _with_further(connection, rows, _read(connection, rows, after_case, limit)))
+            block = _block(rows.infos, _with_further(connection, rows, _read(connection, rows, after_case, limit)))
+        return self._with_quantities(study_id, block)
 
     def page(
         self,
@@ -134,7 +139,7 @@ class Rows(Part):
         block = _block(rows.infos, found)
         if any(kind is not None for kind in (ending, regime, flag)):
             self._digests.require_undamaged(study_id, block.cases)
-        return block
+        return self._with_quantities(study_id, block)
 
     def kinds(self, study_id: str) -> Kinds:
         """How many finished cases have which regime and which flag; raises StudyNotFoundError.
@@ -210,6 +215,16 @@ class Rows(Part):
         """
         wanted: Ints = np.asarray(cases, dtype=np.int64).reshape(-1)
         self._digests.require_undamaged(study_id, wanted)
+        stored, quantities = self._split(study_id, names)
+        columns = self._stored_for(study_id, wanted, stored, number)
+        if quantities is None:
+            return columns
+        ran = np.array([ending not in {None, WorkerEnding.CANCELLED} for ending in columns.endings], dtype=np.bool_)
+        values = {**columns.values, **quantities.columns(wanted, columns.values, ran)}
+        return replace(columns, values={name: values[name] for name in names})
+
+    def _stored_for(self, study_id: str, wanted: Ints, names: Sequence[str], number: int) -> CaseColumns:
+        """`for_cases` of results that are stored."""
         unique, position = np.unique(wanted, return_inverse=True)
         endings, flags = np.full(unique.size, None, dtype=object), np.full(unique.size, "", dtype=object)
         values = np.full((unique.size, len(names)), np.nan)
@@ -233,6 +248,15 @@ class Rows(Part):
     def columns(self, study_id: str, names: Sequence[str]) -> RowColumns:
         """Results ``names`` of every finished case; raises StudyNotFoundError, and KeyError for an unknown name."""
         self._digests.require_undamaged(study_id, np.arange(LOOKED_OVER + 1))
+        stored, quantities = self._split(study_id, names)
+        columns = self._stored_columns(study_id, stored)
+        if quantities is None:
+            return columns
+        values = {**columns.values, **quantities.columns(columns.cases, columns.values)}
+        return replace(columns, values={name: values[name] for name in names})
+
+    def _stored_columns(self, study_id: str, names: Sequence[str]) -> RowColumns:
+        """`columns` of results that are stored."""
         kinds: dict[tuple[str, str], int] = {}
         types = [("case", np.int64), ("ending", object), ("flags", object)]
         layout = np.dtype([*types, *((f"value{index}", np.float64) for index in range(len(names)))])
@@ -254,6 +278,31 @@ class Rows(Part):
         cases, kind = (np.concatenate([part[index] for part in parts]) for index in (0, 1))
         values = {name: np.concatenate([part[2][row] for part in parts]) for row, name in enumerate(names)}
         return RowColumns(cases, tuple(kinds), kind.astype(np.int32), values)
+
+    def _split(self, study_id: str, names: Sequence[str]) -> tuple[Sequence[str], Quantities | None]:
+        """The stored results that ``names`` need, and the quantities among them; None where there is none.
+
+        Raises StudyNotFoundError, and KeyError for a name that is neither.
+        """
+        with self.session.read() as connection:
+            infos = _rows(connection, study_id).infos
+        known = {info.name for info in infos}
+        if known.issuperset(names):
+            return names, None
+        study = self._studies.study(study_id)
+        quantities = models.Quantities(study, models.numeric(infos), (name for name in names if name not in known))
+        stored = (name for name in names if name in known)
+        return list(dict.fromkeys([*stored, *quantities.results])), quantities
+
+    def _with_quantities(self, study_id: str, block: RowBlock) -> RowBlock:
+        """Rows with the quantities of their study behind the stored results."""
+        study = self._studies.study(study_id)
+        if not study.quantities:
+            return block
+        ran = np.array([ending != WorkerEnding.CANCELLED for ending in block.endings], dtype=np.bool_)
+        values = models.with_quantities(study, block.infos, block.cases, block.values, ran)
+        infos = (*block.infos, *(one.info for one in study.quantities))
+        return replace(block, infos=infos, values=values)
 
     def origins(self, study_id: str) -> tuple[Origin, ...]:
         """The origins of the rows of a study, most cases first, those without a fingerprint last.

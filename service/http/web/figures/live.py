@@ -46,7 +46,8 @@ def live_case(study: Study, reading: Reading, width: int) -> dict[str, Any]:
             "frames": frames(made.motion, frequency) if moving else None,
         }  # fmt: skip
     rows, infos = models.run_chunk(study, 0, 1), models.study_results(study)
-    found = {info.name: numbers(rows.values[0, index : index + 1])[0] for index, info in enumerate(infos)}
+    values = models.with_quantities(study, models.model_results(study), range(1), rows.values)
+    found = {info.name: numbers(values[0, index : index + 1])[0] for index, info in enumerate(infos)}
     figure = ""
     if rows.endings[0] == models.OK:
         motion = models.run_trajectory(study, 0, 0.0, models.extent(study, 0).end, _ANGLES)

@@ -31,6 +31,7 @@ from sprag_study.service.http.web.form.components import component_groups, rows_
 from sprag_study.service.http.web.form.entries import Values, plain, text_of
 from sprag_study.service.http.web.form.fields import (
     FORM_MODEL,
+    Choice,
     Groups,
     categories,
     refine_fields,
@@ -54,6 +55,7 @@ from sprag_study.service.http.web.form.spec import (
     REFINE_DEFAULTS,
     is_refined,
     is_search,
+    quantities_of,
     values_of,
 )
 from sprag_study.service.http.web.form.tolerances import BATCH, OWN, distributions, drive_fields, own_name, with_batch
@@ -63,6 +65,7 @@ from sprag_study.service.http.web.templates import fragment, page, spec_text
 from sprag_study.service.http.web.way_in import origin
 from sprag_study.service.http.work import Attended, Work
 from sprag_study.service.jobs.submission import Submission, take_in
+from sprag_study.service.languages import _
 from sprag_study.service.presets import preset_names
 from sprag_study.service.reading.numbers import whole_number
 from sprag_study.service.reading.quantities import Units, preferred
@@ -325,7 +328,9 @@ def sheet_form(request: Request, values: Values, checked: Checked | None, opened
     rows = {} if text_mode else {name: range(count_of(values, name)) for name in parts}
 
     def results(*, numbers: bool = False) -> Groups:
-        return result_choices(reading, lambda name: len(rows.get(name, ())), numbers=numbers)
+        groups = result_choices(reading, lambda name: len(rows.get(name, ())), numbers=numbers)
+        asked = [Choice(name, name, "") for name in quantities_of(values)]
+        return [*groups, *([(_("Quantities"), asked)] if asked else [])]
 
     return {
         "values": values,

@@ -34,7 +34,7 @@ from sprag_study.service.spec.kinds.tolerances import DRAWS
 from sprag_study.service.spec.report import join
 from sprag_study.service.spec.run import TIMED_DEFAULTS, TIMED_FIELDS, time_text
 from sprag_study.worker import models
-from sprag_study.worker.limits import MAX_AXES
+from sprag_study.worker.limits import MAX_AXES, MAX_QUANTITIES
 from sprag_study.worker.models import SETTLED
 
 #: What is asked of a refinement in a form that was not about one.
@@ -233,6 +233,43 @@ def _wrong_column(column: list[Any], first: list[Any]) -> str:
     )
 
 
+class _Quantities:
+    """The quantities of a study: a row has a name, a formula and a unit."""
+
+    def entries(self, form: Filled) -> dict[str, Any]:
+        """As of a `Member`; formulas by name, with their unit where it is given."""
+        quantities: dict[str, Any] = {}
+        pointer = f"{form.pointer}{_ASKED.pointer}"
+        form.fields[pointer] = _ASKED.pointer
+        for row in _ASKED.filled(form.values):
+            inner = form.inside(f"{_ASKED.pointer}/{row}")
+            name, formula, unit = (inner.text(part) for part in ("name", "formula", "unit"))
+            if not name or name in quantities:
+                form.faults[f"{inner.at}/name"] = [_("is the name of another quantity") if name else _("is required")]
+                continue
+            at = join(pointer, name)
+            form.fields |= {at: f"{inner.at}/formula"}
+            form.fields |= {f"{at}/{part}": f"{inner.at}/{part}" for part in ("formula", "unit")}
+            quantities[name] = {"formula": formula, "unit": unit} if unit else formula
+        return {_ASKED.key: quantities} if quantities else {}
+
+    def show(self, item: Mapping[str, Any], form: Filled) -> set[str]:
+        """As of a `Member`."""
+        quantities = item.get(_ASKED.key, {})
+        known = {"formula", "unit"}
+        if not isinstance(quantities, Mapping) or not all(
+            isinstance(each, str) or (isinstance(each, Mapping) and known.issuperset(each))
+            for each in quantities.values()
+        ):
+            raise ValueError("the form has no fields for all of these quantities")
+        form.values[_ASKED.name] = str(len(quantities))
+        for row, (name, given) in enumerate(quantities.items()):
+            whole = {"formula": given} if isinstance(given, str) else given
+            texts = {part: str(whole.get(part, "")) for part in ("formula", "unit")}
+            form.inside(f"{_ASKED.pointer}/{row}").show({"name": name, **texts})
+        return {_ASKED.key}
+
+
 class _Condition:
     """A condition of one or two parts, which must hold together: objects by path."""
 
@@ -325,6 +362,9 @@ _UNTIL: Final = Cell(
     | ({"duration": text_of(item["duration"])} if "duration" in item else {}),
 )  # fmt: skip
 _AT: Final = Rows("at", "/goal/at", MAX_AXES, Record((typed("path"), typed("values"))))
+_ASKED: Final = Rows(
+    "quantities", "/quantities", MAX_QUANTITIES, Record((typed("name"), typed("formula"), typed("unit")))
+)
 #: Lists of rows that users add and remove, by the name of the field with their number.
 PARTS: Final = {
     rows.name: rows
@@ -344,6 +384,7 @@ PARTS: Final = {
             Record((_RESULT, _LIMIT), whole="/result"), new={"kind": "at_most"}, always=False,
         ),
         _AT,
+        _ASKED,
         Rows(
             "ranges", "/sample/ranges", MAX_AXES, Record((_PATHS, _RANGE, chosen(SCALE.name)), whole="/from"),
             whole="/sample/count",
@@ -371,7 +412,13 @@ _CASES: Final = Record(
     when=lambda values: not is_search(values),
 )  # fmt: skip
 _BATCH: Final = Record((Tolerances(), *described(DRAWS.values()), PARTS["correlations"]), when=with_batch)
-_STUDY: Final = Record((typed("name", str), Machine(), _RUN, _BATCH, _GOAL, _CASES))
+_STUDY: Final = Record((typed("name", str), Machine(), _RUN, _Quantities(), _BATCH, _GOAL, _CASES))
+
+
+def quantities_of(values: Values) -> list[str]:
+    """The names of the quantities of a form."""
+    texts = (values.get(f"{_ASKED.pointer}/{row}/name", "").strip() for row in _ASKED.filled(values))
+    return list(dict.fromkeys(filter(None, texts)))
 
 
 def form_with_spec(values: Mapping[str, str]) -> tuple[dict[str, Any], Filled]:
