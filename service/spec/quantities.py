@@ -83,7 +83,7 @@ def read_quantities(draft: Draft) -> tuple[Quantity, ...]:
     infos = models.model_results(replace(draft, axes=(), spread=None, sweep=None).study())
     formulas = {name: own for name in node.value if (own := _formula(node[name], name, draft, infos)) is not None}
     order = _order(node, formulas) if node.sound else ()
-    units = _units(draft, infos)
+    units = _units_of(draft, infos)
     found: dict[str, Quantity] = {}
     for name in order:
         formula, unit = formulas[name]
@@ -149,7 +149,7 @@ def _order(node: Node, formulas: Mapping[str, tuple[Node, Node]]) -> tuple[str, 
         return ()
 
 
-def _units(draft: Draft, infos: Sequence[ResultInfo]) -> dict[str, str]:
+def _units_of(draft: Draft, infos: Sequence[ResultInfo]) -> dict[str, str]:
     """SI unit of every name that a formula may use: numbers that each case has, by path, and results."""
     machine = draft.spec.machine
     varied = {path for axis in draft.axes or () for path in axis.paths}
