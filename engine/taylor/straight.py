@@ -249,6 +249,35 @@ def sincos(code: LaneCode, x: str, tag: str) -> tuple[Term, Term]:
     return sine, cosine
 
 
+#: Splitting of ln 2: multiples of the first part by 11 bits are exact.
+LN2 = ("6.93147180369123816490e-01", "1.90821492927058770002e-10")
+# Coefficients of the exponential of fdlibm on [-ln 2/2, ln 2/2].
+EXPONENTIAL = (
+    Term("1.66666666666666019037e-01"),
+    Term("-2.77777777770155933842e-03"),
+    Term("6.61375632143793436117e-05"),
+    Term("-1.65339022054652515390e-06"),
+    Term("4.13813679705723846039e-08"),
+)
+#: Exponents beyond which their exponential is that of the bound: the power of two must be a normal number.
+LARGEST_EXPONENT = 700.0
+
+
+def exponential(code: LaneCode, x: str, tag: str) -> Term:
+    """e to the power of ``x``, from -`LARGEST_EXPONENT` to it, within an ulp or so, without calls or branches."""
+    given = code.let(f"given_{tag}", x)
+    least = code.let(f"least_{tag}", larger(given, repr(-LARGEST_EXPONENT)))
+    inside = code.let(f"inside_{tag}", smaller(least, repr(LARGEST_EXPONENT)))
+    n = code.let(f"n_{tag}", f"({inside}*1.4426950408889634 + {ROUND}) - {ROUND}")
+    high = code.let(f"eh_{tag}", f"{inside} - {n}*{LN2[0]}")
+    low = code.let(f"el_{tag}", f"{n}*{LN2[1]}")
+    r = code.let(f"er_{tag}", f"{high} - {low}")
+    t = code.let(f"et_{tag}", f"{r}*{r}")
+    c = code.let(f"ec_{tag}", f"{r} - {t}*({horner(EXPONENTIAL, t)})")
+    value = code.let(f"ev_{tag}", f"1.0 - (({low} - ({r}*{c})/(2.0 - {c})) - {high})")
+    return code.let(f"exp_{tag}", f"{value}*of_bits(({n} + 1023.0)*4503599627370496.0)")
+
+
 def log2(x: str) -> str:
     """Base-2 logarithm of a positive double within 0.09, from its bits read as an integer."""
     return f"(bits_of({x})*2.220446049250313e-16 - 1023.0)"

@@ -1,6 +1,8 @@
 """State and sums of every lane at the end of the part x of its step, from the stored series."""
 
-from sprag_study.engine.taylor.straight import LaneCode, Term, horner, integral, product, square
+import math
+
+from sprag_study.engine.taylor.straight import ROUND, LaneCode, Term, horner, integral, product, square
 from sprag_study.engine.vibration_drive.layout import Layout
 
 #: Smallest step, in excitation periods: below it a step no longer moves the phase.
@@ -83,10 +85,20 @@ class _Advance:
             cubes = [code.let("C", product(squares, self.shaft, k)) for k in range(layout.order + 1)]
             self.add(layout.speed_square, self.over(squares))
             self.add(layout.speed_cube, self.over(cubes))
+        if layout.curved:
+            curve = code.series("B", layout.curve, layout.order + 1)
+            self.add(layout.curve_impulse, f"{rotating}*({self.over(curve)})")
+            against = [code.let("L", product(curve, self.shaft, k)) for k in range(layout.order + 1)]
+            self.add(layout.curve_work, self.over(against))
         self.add(layout.time_held, f"(1.0 - {rotating})*{self.taken}")
         self.add(layout.time_rotating, f"{rotating}*{self.taken}")
         self.add(layout.time_driven, f"{code.row(layout.driven)}*{self.taken}")
-        self.add(layout.turn, self.over(self.shaft))
+        turned = self.over(self.shaft)
+        self.add(layout.turn, turned)
+        if layout.curved:
+            cycle = code.let("cycle", f"{code.row(layout.cycle)} + {code.row(layout.cycles)}*{turned}")
+            whole = code.let("whole", f"({cycle}*{0.5 / math.pi!r} + {ROUND}) - {ROUND}")
+            code.store(layout.cycle, f"{cycle} - {whole}*{2.0 * math.pi!r}")
         speed_end = code.let("speed_end", horner(self.shaft, self.x))
         code.store(layout.speed, speed_end)
         self.add(layout.f, f"{self.taken}/{code.row(layout.period)}")

@@ -136,6 +136,13 @@ class _Watch:
         for corner in corners[1:]:
             highest = code.let("highest", larger(corner, highest))
         self._exceed(layout.power_max + block, f"{highest} - {code.row(layout.power_max)}")
+        if layout.curved:
+            # No term of the load pushes, so that its power is largest where all are.
+            curve = span(code, "B", code.series("B", layout.curve, layout.order + 1))
+            fastest = code.let("fastest", larger(speeds.high, "0.0"))
+            rising = f"({code.row(layout.generator)} + {code.row(layout.quadratic)}*{fastest})*{fastest}"
+            most = f"({code.row(layout.load)} + {rising} + ({curve.high}))*{fastest}"
+            self._exceed(layout.useful_max + block, f"{most} - {code.row(layout.useful_max)}")
 
 
 def bounds_loop(layout: Layout) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sprag_study.engine.run import Run
-from sprag_study.engine.vibration_drive.parameters import DRAG, MAX_COEFFICIENTS, MAX_PENDULUMS, PARAMETERS
+from sprag_study.engine.vibration_drive.parameters import CURVE, DRAG, MAX_COEFFICIENTS, MAX_PENDULUMS, PARAMETERS
 
 Floats = NDArray[np.float64]
 
@@ -26,6 +26,11 @@ class Column(IntEnum):
     BEARING = auto()
     LINEAR = auto()
     QUADRATIC = auto()
+    STRIBECK = auto()
+    STRIBECK_RATE = auto()
+    CYCLIC = auto()
+    CYCLES = auto()
+    CYCLE = auto()
     INERTIA = auto()
     INVERSE_RATE = auto()
     SPEED = auto()
@@ -108,9 +113,32 @@ def has_drag(paths: Iterable[str]) -> bool:
     return any(path.rpartition(".")[2] in DRAG for path in paths)
 
 
+def has_curve(paths: Iterable[str]) -> bool:
+    """Whether any of the parameters is that of a load that is no polynomial of the speed."""
+    return any(path.rpartition(".")[2] in CURVE for path in paths)
+
+
+def load_at_rest(matrix: Floats) -> Floats:
+    """Mean torque in N*m up to which the load of each case of a matrix holds a shaft that stands, shape (cases,)."""
+    load: Floats = matrix[:, Column.LOAD] + matrix[:, Column.STRIBECK]
+    return load
+
+
+def swings(matrix: Floats) -> NDArray[np.bool_]:
+    """Whether the load of each case of a matrix swings with the angle of the shaft, shape (cases,)."""
+    cyclic: NDArray[np.bool_] = matrix[:, Column.CYCLIC] > 0.0
+    return cyclic
+
+
+def bends(matrix: Floats) -> NDArray[np.bool_]:
+    """Whether the load of each case of a matrix has a term that does not rise with the speed, shape (cases,)."""
+    bent: NDArray[np.bool_] = swings(matrix) | (matrix[:, Column.STRIBECK] > 0.0)
+    return bent
+
+
 def unloaded(matrix: Floats, pendulums: int) -> NDArray[np.bool_]:
     """Whether nothing resists the shaft of each case of a matrix, so that every speed that no clutch changes lasts."""
-    resisting = [Column.LOAD, Column.BEARING, Column.LINEAR, Column.QUADRATIC]
+    resisting = [Column.LOAD, Column.BEARING, Column.LINEAR, Column.QUADRATIC, Column.STRIBECK]
     # A drive with drag in an overrunning clutch has a backstop.
     width = (matrix.shape[1] - stop_column(STOPS)) // pendulums
     drags = matrix[:, stop_column(STOPS) + PendulumColumn.OVERRUNNING_DAMPING :: width]
@@ -148,9 +176,10 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
     Returns
     -------
     array, shape (cases, columns)
-        `Column`: nu, period, d nu^2, b nu^2, chi, g, M_c, lambda_e, k_1, k_2, J_e, 1/rate, initial speed, step budget;
-        four stops; per pendulum `PendulumColumn`: M l/J, c a^2/J, lambda/J, 1/J, J, delta, u_end, lambda_k, lambda_o,
-        initial angle, speed, windup and state of the clutch; its clutch coefficients.
+        `Column`: nu, period, d nu^2, b nu^2, chi, g, M_c, lambda_e, k_1, k_2, M_s, 1/omega_s, kappa M_c, m, psi, J_e,
+        1/rate, initial speed, step budget; four stops; per pendulum `PendulumColumn`: M l/J, c a^2/J, lambda/J,
+        1/J, J, delta, u_end, lambda_k, lambda_o, initial angle, speed, windup and state of the clutch; its clutch
+        coefficients.
     """
     n, count = pendulum_count(columns), coefficient_count(columns)
 
@@ -213,7 +242,10 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
         C.NU: nu, C.PERIOD: 1.0 / frequency, C.ACC_X: acc_x, C.ACC_Y: acc_y,
         C.CHI: parameter("excitation.phase"), C.GRAVITY: gravity, C.LOAD: parameter("shaft.load"),
         C.BEARING: parameter("shaft.bearing_damping"), C.LINEAR: parameter("shaft.linear_load"),
-        C.QUADRATIC: parameter("shaft.quadratic_load"),
+        C.QUADRATIC: parameter("shaft.quadratic_load"), C.STRIBECK: parameter("shaft.stribeck_load"),
+        C.STRIBECK_RATE: 1.0 / parameter("shaft.stribeck_speed"),
+        C.CYCLIC: parameter("shaft.cyclic_load") * parameter("shaft.load"), C.CYCLES: parameter("shaft.load_cycles"),
+        C.CYCLE: parameter("shaft.load_phase"),
         C.INERTIA: shaft_inertia, C.INVERSE_RATE: 1.0 / rate, C.SPEED: parameter("shaft.initial_speed"),
         C.MOST_STEPS: run.step_budget(cycles),
     }  # fmt: skip

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from sprag_study.engine.vibration_drive.cases import (
     Column,
     PendulumColumn,
+    bends,
     pendulum_column,
     stop_column,
     unloaded,
@@ -64,9 +65,11 @@ class _Cases:
         column: Floats = self.sums[:, first + row - self.lay.p_sum_phi]
         return column
 
-    def work_against_load(self, turn: Floats, square: Floats, cube: Floats) -> Floats:
-        """Work in J against the load, from the integrals of the shaft's speed, its square and its cube."""
-        work: Floats = self.load * turn + self.linear * square + self.quadratic * cube
+    def work_against_load(self, turn: Floats, square: Floats, cube: Floats, curve: Floats) -> Floats:
+        """Work in J against the load, from the integrals of the shaft's speed, its square and its cube, and the work
+        against the terms of the load that are no polynomial.
+        """
+        work: Floats = self.load * turn + self.linear * square + self.quadratic * cube + curve
         return work
 
     def parameter(self, i: int, column: PendulumColumn) -> Floats:
@@ -101,8 +104,9 @@ def characteristics(lay: Layout, matrix: Floats, sums: Floats) -> Floats:
 
 #: Sums, marks and extrema that are 0 where the shaft stands.
 _OF_ROTATION = (
-    "time_rotating", "speed_square", "speed_cube", "work_clutch", "speed_max", "speed_min", "acc_max", "power_max",
-    "turn_0", "turn_1", "turn_2", "speed_0", "speed_2", "square_1", "cube_1",
+    "time_rotating", "speed_square", "speed_cube", "curve_impulse", "curve_work", "work_clutch", "speed_max",
+    "speed_min", "acc_max", "power_max", "useful_max", "turn_0", "turn_1", "turn_2", "speed_0", "speed_2", "square_1",
+    "cube_1", "curve_1",
 )  # fmt: skip
 
 
@@ -157,11 +161,11 @@ def tied_clutches(lay: Layout, matrix: Floats, sums: Floats) -> NDArray[np.bool_
 
 _SMALLEST = ("speed_min", "p_phi_min", "p_speed_min", "p_acc_min")
 _LARGEST = (
-    "speed_max", "acc_max", "sum_max", "power_max", "driving_max", "p_phi_max", "p_speed_max", "p_acc_max",
-    "p_torque_max", "p_u_max",
+    "speed_max", "acc_max", "sum_max", "power_max", "useful_max", "driving_max", "p_phi_max", "p_speed_max",
+    "p_acc_max", "p_torque_max", "p_u_max",
 )  # fmt: skip
 _LATEST = ("speed_2", "energy_2")
-_FIRST = ("speed_0", "energy_0", "turn_0", "turn_1", "input_1", "square_1", "cube_1")
+_FIRST = ("speed_0", "energy_0", "turn_0", "turn_1", "input_1", "square_1", "cube_1", "curve_1")
 
 
 def combined(lay: Layout, parts: list[Floats]) -> Floats:
@@ -254,8 +258,12 @@ def _shaft(cases: _Cases, out: dict[str, Floats]) -> None:
     out["power.bearing.mean"] = cases.bearing * square / cases.length
     out["power.linear.mean"] = cases.linear * square / cases.length
     out["power.quadratic.mean"] = cases.quadratic * cube / cases.length
-    out["power.useful.mean"] = cases.load * mean + (out["power.linear.mean"] + out["power.quadratic.mean"])
-    out["power.useful.max"] = cases.work_against_load(highest, np.square(highest), highest * np.square(highest))
+    curve = cases.shaft("curve_work")
+    polynomial = cases.load * mean + (out["power.linear.mean"] + out["power.quadratic.mean"])
+    out["power.useful.mean"] = polynomial + curve / cases.length
+    # The power of a load that does not fall is largest at the largest speed.
+    rising = cases.work_against_load(highest, np.square(highest), highest * np.square(highest), np.zeros_like(highest))
+    out["power.useful.max"] = np.where(bends(cases.matrix), cases.shaft("useful_max"), rising)
     out["power.clutch.mean"] = cases.shaft("work_clutch") / cases.length
     out["power.clutch.max"] = cases.shaft("power_max")
     out["power.input.mean"] = _over_pendulums(cases, out, "power.input")
@@ -266,6 +274,7 @@ def _shaft(cases: _Cases, out: dict[str, Floats]) -> None:
         cases.shaft("turn_2") - cases.shaft("turn_1"),
         square - cases.shaft("square_1"),
         cube - cases.shaft("cube_1"),
+        curve - cases.shaft("curve_1"),
     )
     supplied = out["power.input.mean"] * cases.length - cases.shaft("input_1")
     out["efficiency"] = np.where(cases.whole_periods > 0.5, _ratio(useful, supplied), np.nan)
@@ -292,7 +301,7 @@ def _balances(cases: _Cases, out: dict[str, Floats]) -> None:
     stored = out["power.stored.mean"] * length
     lost = out["power.loss.mean"] * length
     square = cases.shaft("speed_square")
-    useful = cases.work_against_load(turn, square, cases.shaft("speed_cube"))
+    useful = cases.work_against_load(turn, square, cases.shaft("speed_cube"), cases.shaft("curve_work"))
     kinetic = 0.5 * cases.inertia * np.square(cases.shaft("speed_max"))
     for i in range(cases.lay.n):
         fastest = np.maximum(cases.pendulum(i, "speed_max"), -cases.pendulum(i, "speed_min"))
@@ -307,7 +316,10 @@ def _balances(cases: _Cases, out: dict[str, Floats]) -> None:
 
     impulse = out["torque.mean"] * length
     against = (
-        cases.load * cases.shaft("time_rotating") + (cases.bearing + cases.linear) * turn + cases.quadratic * square
+        cases.load * cases.shaft("time_rotating")
+        + (cases.bearing + cases.linear) * turn
+        + cases.quadratic * square
+        + cases.shaft("curve_impulse")
     )
     gained = cases.inertia * (cases.shaft("speed_2") - cases.shaft("speed_0"))
     held = cases.shaft("sum_held")

@@ -5,7 +5,8 @@ speed and total clutch torque of the shaft, ``X, Y`` the base's accelerations x'
 by J:
 
     w' = (M l/J) (x'' cos phi + y'' sin phi + g sin phi) - (c a^2/J) phi - (lambda/J) w - T/J
-    shaft' = (sum T - M_c - (lambda_e + k_1) shaft - k_2 shaft^2) / J_e
+    shaft' = (sum T - M_c - (lambda_e + k_1) shaft - k_2 shaft^2 - B) / J_e
+    B = M_s exp(-shaft/omega_s) + kappa M_c cos theta,   theta' = m shaft
     T = sum c_k u^(k-1) + rate u'                  u' = w - shaft
 
 Modes enter as numbers, not branches: the law in force is zero where a clutch is free and a straight line beyond the
@@ -19,6 +20,7 @@ from sprag_study.engine.taylor.straight import (
     LaneCode,
     Term,
     exp2,
+    exponential,
     log2,
     product,
     same_everywhere,
@@ -142,14 +144,22 @@ def series_loop(layout: Layout) -> str:
     """Source of the loop that finds the series of every lane, in fractions of the step they allow, and stores them."""
     code = LaneCode(layout.lanes)
     order = layout.order
-    names = ("gravity", "load", "mobility", *(("linear", "quadratic") if layout.drag else ()))
+    names = (
+        *("gravity", "load", "mobility"),
+        *(("linear", "quadratic") if layout.drag else ()),
+    )
     gravity, *_ = (code.load(name, getattr(layout, name)) for name in names)
     x, y = _excitation(code, layout)
     pendulums = [_Pendulum(code, layout, i) for i in range(layout.n)]
     for p in pendulums:
         p.weight = code.let(f"weight{p.index}", p.ml * gravity)
     shaft = [code.load("W0", layout.speed)]
+    rates: list[Term] = []
+    bent = _Curve(code, layout, shaft, rates) if layout.curved else None
+    curve = [] if bent is None else bent.series
     for k in range(order + 1):
+        if bent is not None:
+            bent.extend(k)
         for p in pendulums:
             damping = f" + {p.rate}*({p.w[k]} - {shaft[k]})" if layout.drag else ""
             p.torque.append(_torque(code, p, k, damping))
@@ -161,7 +171,9 @@ def series_loop(layout: Layout) -> str:
             if layout.drag:
                 squared = code.let(f"WW{k}", square(shaft, k))
                 against += f" - {resistance(Term('linear'), Term('quadratic'), shaft[k], squared)}"
-            code.let(f"A{k}", f"mobility*({push}{against})")
+            if layout.curved:
+                against += f" - {curve[k]}"
+            rates.append(code.let(f"A{k}", f"mobility*({push}{against})"))
             shaft.append(code.let(f"W{k + 1}", f"A{k}*{1.0 / (k + 1)!r}"))
             for p in pendulums:
                 i = p.index
@@ -173,18 +185,53 @@ def series_loop(layout: Layout) -> str:
                 p.phi.append(code.let(f"phi{i}_{k + 1}", f"{p.w[k]}*{1.0 / (k + 1)!r}"))
                 p.u.append(code.let(f"u{i}_{k + 1}", f"({p.w[k]} - {shaft[k]})*{1.0 / (k + 1)!r}"))
     _step_size(code, layout, pendulums, shaft)
-    _in_fractions(code, order, pendulums, shaft)
+    _in_fractions(code, order, pendulums, shaft, curve)
     _store_series(code, layout, pendulums, shaft)
+    for k, term in enumerate(curve):
+        code.store(layout.curve + k, term)
     return code.loop()
 
 
-def _in_fractions(code: LaneCode, order: int, pendulums: list[_Pendulum], shaft: list[Term]) -> None:
+class _Curve:
+    """Series of B, the terms of the load that are no polynomial of the speed.
+
+    y = M_s exp(-shaft/omega_s) has y' = -(shaft'/omega_s) y, and sine and cosine of theta have (sin)' = m shaft cos.
+    """
+
+    def __init__(self, code: LaneCode, layout: Layout, shaft: list[Term], rates: list[Term]) -> None:
+        self.code, self.shaft, self.rates = code, shaft, rates
+        self.falls, self.decay = code.load("stribeck", layout.stribeck), code.load("decay", layout.stribeck_rate)
+        self.cyclic, self.cycles = code.load("cyclic", layout.cyclic), code.load("cycles", layout.cycles)
+        sine, cosine = sincos(code, code.load("cycle", layout.cycle), "e")
+        self.sine, self.cosine = [sine], [cosine]
+        self.falling: list[Term] = []
+        self.series: list[Term] = []
+
+    def extend(self, k: int) -> None:
+        """Add coefficient k, from those of the speed up to k and of its rate before k."""
+        code = self.code
+        if k == 0:
+            value = f"{self.falls}*{exponential(code, f'-{self.decay}*{self.shaft[0]}', 'E')}"
+        else:
+            value = f"({product(self.rates, self.falling, k - 1)})*({self.decay}*{-1.0 / k!r})"
+            turned = code.let(f"m{k}", f"{self.cycles}*{1.0 / k!r}")
+            sine = code.let(f"es{k}", f"({product(self.shaft, self.cosine, k - 1)})*{turned}")
+            cosine = code.let(f"ec{k}", f"({product(self.shaft, self.sine, k - 1)})*(-{turned})")
+            self.sine.append(sine)
+            self.cosine.append(cosine)
+        self.falling.append(code.let(f"E{k}", value))
+        self.series.append(code.let(f"B{k}", f"{self.falling[k]} + {self.cyclic}*{self.cosine[k]}"))
+
+
+def _in_fractions(code: LaneCode, order: int, pendulums: list[_Pendulum], shaft: list[Term], curve: list[Term]) -> None:
     """Rescale every series from seconds to fractions of the step: coefficient k times h^k."""
     power = "h"
     for k in range(1, order + 1):
         if k > 1:
             power = code.let(f"h_{k}", f"{power}*h")
         shaft[k] = code.let(f"Wx{k}", f"{shaft[k]}*{power}")
+        if curve:
+            curve[k] = code.let(f"Bx{k}", f"{curve[k]}*{power}")
         for p in pendulums:
             i = p.index
             p.w[k] = code.let(f"wx{i}_{k}", f"{p.w[k]}*{power}")

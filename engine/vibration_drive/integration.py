@@ -76,8 +76,8 @@ def integrate(
     samples = np.empty((len(asked), pendulum_samples(n).start))
     states = np.zeros((len(asked), 1 + n), dtype=np.int64)
     steps = np.full((pieces, piece_width(lay)), np.nan)
-    # Guards (7 a pendulum and shaft at most) and extrema (13) that all lanes together can list in a step.
-    listed = lay.lanes * (5 + 8 * n)
+    # Guards (7 a pendulum and shaft at most) and extrema (14) that all lanes together can list in a step.
+    listed = lay.lanes * (6 + 8 * n)
     done = kernel.integrate(
         kernel.RECORD, matrix, from_rest(cases, n) if starts is None else starts, recorded,
         run.tolerance, same_everywhere(math.log2(run.tolerance)), int(run.reset == "literal"),

@@ -47,6 +47,8 @@ class Layout(NamedTuple):
     coefficients: int
     # whether torques act that depend on speeds (`parameters.DRAG`): 0 or 1
     drag: int
+    # whether the load has terms that are no polynomial of the speed (`parameters.CURVE`): 0 or 1, with drag only
+    curved: int
     order: int
     lanes: int
     rows: int
@@ -58,7 +60,9 @@ class Layout(NamedTuple):
     period: int
     # parameters; acc_x, acc_y are the amplitudes of the base's acceleration, inverse_rate scales accelerations to
     # speeds, backstop is 1 where the shaft cannot be turned back, linear and
-    # quadratic are the torques per speed and per square of it that resist the shaft
+    # quadratic are the torques per speed and per square of it that resist the shaft, generator the useful part of
+    # linear; stribeck is the load's torque that falls with the speed, as exp(-stribeck_rate speed), cyclic the
+    # amplitude of that which swings with the shaft's angle, in so many cycles a turn
     nu: int
     acc_x: int
     acc_y: int
@@ -69,6 +73,11 @@ class Layout(NamedTuple):
     backstop: int
     linear: int
     quadratic: int
+    generator: int
+    stribeck: int
+    stribeck_rate: int
+    cyclic: int
+    cycles: int
     inertia: int
     inverse_rate: int
     most_steps: int
@@ -89,15 +98,19 @@ class Layout(NamedTuple):
     excess: int
     attention: int
     steps: int
-    # state (with speed[0])
+    # state (with speed[0]); cycle is where the cyclic load is in its cycle, from -pi to pi
     turn: int
-    # sums over the window; speed_square and speed_cube are integrals of powers of the shaft's speed
+    cycle: int
+    # sums over the window; speed_square and speed_cube are integrals of powers of the shaft's speed, curve_impulse and
+    # curve_work those of the terms of the load that are no polynomial, and of their power
     sum_held: int
     time_held: int
     time_rotating: int
     time_driven: int
     speed_square: int
     speed_cube: int
+    curve_impulse: int
+    curve_work: int
     work_clutch: int
     # extrema over the window
     speed_max: int
@@ -105,6 +118,7 @@ class Layout(NamedTuple):
     acc_max: int
     sum_max: int
     power_max: int
+    useful_max: int
     # marks: values at the window's start (0), at the start of its whole periods (1), at its end (2)
     turn_0: int
     turn_1: int
@@ -116,6 +130,7 @@ class Layout(NamedTuple):
     input_1: int
     square_1: int
     cube_1: int
+    curve_1: int
     driving_max: int
     energy_lost: int
     # excess of this step over each known extremum
@@ -124,11 +139,14 @@ class Layout(NamedTuple):
     x_acc_max: int
     x_sum_max: int
     x_power_max: int
+    x_useful_max: int
     # distance of this step to the shaft's guards
     m_sum_high: int
     m_speed_low: int
-    # series of the shaft's speed, order + 1 coefficients, in fractions of the planned step
+    # series of the shaft's speed, order + 1 coefficients, in fractions of the planned step, and where `curved` says so
+    # that of the load's torque beside its polynomial
     speed: int
+    curve: int
     # one pendulum
     p_ml: int
     p_spring: int
@@ -207,16 +225,16 @@ def _beside(*groups: str) -> None:
 
 _BANDS = "w_low {0}w_high {0}u_low {0}u_high {0}t_low {0}t_high"
 _EXTREMA = "phi_max {0}phi_min {0}speed_max {0}speed_min {0}acc_max {0}acc_min {0}torque_max {0}u_max"
-_SHAFT_EXTREMA = "speed_max {0}speed_min {0}acc_max {0}sum_max {0}power_max"
+_SHAFT_EXTREMA = "speed_max {0}speed_min {0}acc_max {0}sum_max {0}power_max {0}useful_max"
 _beside(
     # As the columns of a case (`PendulumColumn`) are copied.
     "p_ml p_spring p_damping p_inverse_inertia p_inertia p_backlash p_limit p_clutch_damping p_overrunning_damping",
     # Sums that begin at 0, those of the shaft and those of a pendulum.
-    "sum_held time_held time_rotating time_driven speed_square speed_cube work_clutch",
+    "sum_held time_held time_rotating time_driven speed_square speed_cube curve_impulse curve_work work_clutch",
     "p_sum_phi p_sum_torque p_work_input p_work_loss p_work_clutch p_time_engaged p_time_beyond p_engagements",
     # What is handed out at the end of a window, as far as characteristics reads it.
-    "work_clutch speed_max speed_min acc_max sum_max power_max turn_0 turn_1 turn_2 speed_0 speed_2 energy_0 energy_2 "
-    "input_1 square_1 cube_1 driving_max energy_lost",
+    "work_clutch speed_max speed_min acc_max sum_max power_max useful_max turn_0 turn_1 turn_2 speed_0 speed_2 "
+    "energy_0 energy_2 input_1 square_1 cube_1 curve_1 driving_max energy_lost",
     "p_engagements p_phi_max p_phi_min p_speed_max p_speed_min p_acc_max p_acc_min p_torque_max p_u_max",
     # Guards in the order of `Band`, and what lies as far from its bounds or extrema as any other.
     f"p_{_BANDS.format('p_')}",
@@ -230,11 +248,14 @@ _beside(
 )
 
 
-def make_layout(n: int, coefficients: int, order: int, lanes: int, *, drag: bool = False) -> Layout:
+def make_layout(
+    n: int, coefficients: int, order: int, lanes: int, *, drag: bool = False, curved: bool = False
+) -> Layout:
     """Lay out the rows for ``n`` pendulums, that many clutch coefficients, series of that order, and that many lanes;
-    ``drag``: for torques that depend on speeds too.
+    ``drag``: for torques that depend on speeds too; ``curved``: for a load that is no polynomial of the speed besides.
     """
     sizes = dict.fromkeys(("speed", "p_speed", "p_torque"), order + 1)
+    sizes["curve"] = order + 1 if curved else 1
     sizes |= {"p_drive": order, "p_law": coefficients, "p_force": coefficients}
     names = Layout._fields[Layout._fields.index("stride") + 1 :]
     fields: dict[str, int] = {}
@@ -246,7 +267,8 @@ def make_layout(n: int, coefficients: int, order: int, lanes: int, *, drag: bool
         else:
             fields[name] = shaft_rows
             shaft_rows += sizes.get(name, 1)
-    return Layout(n, coefficients, int(drag), order, lanes, shaft_rows + n * stride, shaft_rows, stride, **fields)
+    terms = int(drag or curved), int(curved)
+    return Layout(n, coefficients, *terms, order, lanes, shaft_rows + n * stride, shaft_rows, stride, **fields)
 
 
 def as_record(layout: Layout) -> Layout:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from sprag_study.engine.compile.jit import inlined, part
 from sprag_study.engine.elementary.angles import cosine, sine
+from sprag_study.engine.elementary.powers import exponential
 from sprag_study.engine.vibration_drive.automaton import Band
 from sprag_study.engine.vibration_drive.formulas import base_series, drive, free_acceleration, resistance
 from sprag_study.engine.vibration_drive.layout import Layout
@@ -214,6 +215,12 @@ def _consistent(W: Floats, lay: Layout, lane: int, push: float) -> float:
 
 
 @part
+def _falling(W: Floats, lay: Layout, lane: int) -> float:
+    """Torque of the load in N*m that falls with the shaft's speed."""
+    return float(W[lay.stribeck, lane] * exponential(-W[lay.stribeck_rate, lane] * W[lay.speed, lane]))
+
+
+@part
 def _shared_acceleration(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, size: float) -> float:
     """Acceleration of the shaft that is consistent with all clutches that meet clutch ``i``; notes each one's lock
     torque and the width of its edges.
@@ -225,6 +232,8 @@ def _shared_acceleration(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, siz
     if lay.drag == 1:
         speed = W[lay.speed, lane]
         push -= _resistance(W[lay.linear, lane], W[lay.quadratic, lane], speed, speed * speed)
+    if lay.curved == 1:
+        push -= _falling(W, lay, lane) + W[lay.cyclic, lane] * cosine(W[lay.cycle, lane])
     for j in range(lay.n):
         base = lay.pendulums + j * lay.stride
         notes = base + lay.p_m_w_low
@@ -257,6 +266,10 @@ def _shared_jerk(W: Floats, Z: Ints, lay: Layout, lane: int, rate: float) -> Non
     push = 0.0
     if lay.drag == 1:
         push -= _resistance(W[lay.linear, lane], W[lay.quadratic, lane], rate, 2.0 * W[lay.speed, lane] * rate)
+    if lay.curved == 1:
+        push += W[lay.stribeck_rate, lane] * rate * _falling(W, lay, lane)
+        swing = W[lay.cycles, lane] * W[lay.speed, lane]
+        push += W[lay.cyclic, lane] * swing * sine(W[lay.cycle, lane])
     for j in range(lay.n):
         base = lay.pendulums + j * lay.stride
         notes = base + lay.p_m_w_low

@@ -18,8 +18,12 @@ _INF = math.inf
 START_STATES = frozenset({"initial_windup", "initial_clutch"})
 #: Torques that depend on speeds: a drive in which any of them is given needs a kernel that has them.
 DRAG = frozenset({"bearing_damping", "linear_load", "quadratic_load", "clutch_damping", "overrunning_damping"})
+#: Loads that are no polynomials of the speed: a drive in which any of them is given needs a kernel that has them too.
+CURVE = frozenset({"stribeck_load", "stribeck_speed", "cyclic_load", "load_cycles", "load_phase"})
+#: A load that swings with the angle of the shaft, for runs of a given time only.
+CYCLIC = "shaft.cyclic_load"
 #: Parameters that a study has only where they are given: studies from before they existed keep their cases.
-ONLY_GIVEN = START_STATES | DRAG
+ONLY_GIVEN = START_STATES | DRAG | CURVE
 
 _PARAMETERS = (
     Parameter("gravity", "g", "m/s^2", 0.0, 1e3, False, STANDARD_GRAVITY, "gravitational acceleration"),
@@ -105,6 +109,39 @@ _PARAMETERS = (
         0.0,
         "load torque per square of the speed, as of a fan or a pump",
     ),
+    Parameter(
+        "shaft.stribeck_load",
+        "M_s",
+        "N*m",
+        0.0,
+        1e9,
+        False,
+        0.0,
+        "load torque at rest beyond the load torque, which falls exponentially with the speed, as of friction",
+    ),
+    Parameter(
+        "shaft.stribeck_speed",
+        "omega_s",
+        "rad/s",
+        0.0,
+        1e6,
+        True,
+        1.0,
+        "speed at which the Stribeck load has fallen to 1/e",
+    ),
+    Parameter(
+        CYCLIC,
+        "kappa",
+        "1",
+        0.0,
+        1.0,
+        False,
+        0.0,
+        "share of the load torque by which it swings with the angle of the shaft, as of a press or a cam; only in runs "
+        "of a given time",
+    ),
+    Parameter("shaft.load_cycles", "m", "1", 0.0, 1e3, True, 1.0, "cycles of the cyclic load in a turn of the shaft"),
+    Parameter("shaft.load_phase", "psi", "rad", -1e3, 1e3, False, 0.0, "phase of the cyclic load at t = 0"),
     Parameter("shaft.initial_speed", "phi_e'(0)", "rad/s", 0.0, 1e6, False, 0.0, "shaft speed at t = 0"),
 )
 
@@ -123,6 +160,9 @@ _PLAUSIBLE: Mapping[str, tuple[float, Sentence]] = {
     "bearing_damping": (100.0, IN_ANOTHER_UNIT),
     "clutch_damping": (100.0, IN_ANOTHER_UNIT),
     "overrunning_damping": (100.0, IN_ANOTHER_UNIT),
+    "load_phase": (2.0 * math.pi, IN_DEGREES),
+    "stribeck_load": (1e4, Sentence("was it in N*mm?")),
+    "stribeck_speed": (1e3, IN_RPM),
     "linear_load": (1e3, IN_ANOTHER_UNIT),
     "quadratic_load": (100.0, IN_ANOTHER_UNIT),
     "backlash": (0.1, IN_DEGREES),

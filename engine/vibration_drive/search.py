@@ -13,7 +13,7 @@ from sprag_study.engine.endings import ENDINGS, Ending
 from sprag_study.engine.run import Run, SettledRun
 from sprag_study.engine.vibration_drive import newton, orbits
 from sprag_study.engine.vibration_drive.automaton import Clutch, Shaft
-from sprag_study.engine.vibration_drive.cases import Column, with_lengths
+from sprag_study.engine.vibration_drive.cases import Column, swings, with_lengths
 from sprag_study.engine.vibration_drive.characteristics import of_orbits, tied_clutches
 from sprag_study.engine.vibration_drive.integration import Integration, integrate
 from sprag_study.engine.vibration_drive.kernel import Kernel
@@ -138,6 +138,8 @@ class Search:
     budget: Floats = field(init=False)
 
     def __post_init__(self) -> None:
+        if np.any(swings(self.matrix)):
+            raise ValueError("a load that swings with the angle of the shaft does not repeat with the excitation")
         cases, n = len(self.matrix), self.kernel.LAYOUT.n
         self.matrix = self.matrix.copy()
         self.budget = RUNS * self.matrix[:, Column.MOST_STEPS]

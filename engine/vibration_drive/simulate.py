@@ -154,7 +154,7 @@ def sampled(values: Mapping[str, float], matrix: Floats, found: Integration, tim
     if not unloaded(matrix, n)[0]:
         # As for the minimum in ``characteristics``: only rounding errors can turn back a resisted shaft.
         out["shaft.speed"] = np.maximum(out["shaft.speed"], 0.0)
-    out["power.useful"] = _load_torque(value, out["shaft.speed"]) * out["shaft.speed"]
+    out["power.useful"] = _load_torque(value, out["shaft.speed"], out["shaft.angle"]) * out["shaft.speed"]
     out["power.clutch"] = out["torque"] * out["shaft.speed"]
     clutch_losses: list[Floats] = []
     for i in range(n):
@@ -183,13 +183,18 @@ def sampled(values: Mapping[str, float], matrix: Floats, found: Integration, tim
     return Trajectory(times_done, names, units, np.column_stack([out[name] for name in names]), named, ending)
 
 
-def _load_torque(value: Mapping[str, float], speed: Floats) -> Floats:
-    """Torque of the load in N*m at speeds of a rotating shaft in rad/s."""
+def _load_torque(value: Mapping[str, float], speed: Floats, angle: Floats) -> Floats:
+    """Torque of the load in N*m at speeds in rad/s of a rotating shaft, and at its angles in rad from t = 0 on."""
     torque: Floats = value["shaft.load"] + (value["shaft.linear_load"] + value["shaft.quadratic_load"] * speed) * speed
+    if value["shaft.stribeck_load"] > 0.0:
+        torque = torque + value["shaft.stribeck_load"] * elementary.exp(-speed / value["shaft.stribeck_speed"])
+    if value["shaft.cyclic_load"] > 0.0:
+        cycle = elementary.cos(value["shaft.load_cycles"] * angle + value["shaft.load_phase"])
+        torque = torque + value["shaft.load"] * value["shaft.cyclic_load"] * cycle
     return torque
 
 
-def warm_up(pendulums: int, coefficients: int, tolerance: float, drag: bool = False) -> None:
+def warm_up(pendulums: int, coefficients: int, tolerance: float, drag: bool = False, curved: bool = False) -> None:
     """Generate and compile the kernel of a shape, and what settles motions, so that others load them from the cache."""
     from sprag_study.engine.vibration_drive.settle import settle
 
@@ -198,6 +203,7 @@ def warm_up(pendulums: int, coefficients: int, tolerance: float, drag: bool = Fa
         columns |= {f"pendulums.{i}.inertia": 1.0, f"pendulums.{i}.mass": 0.0, f"pendulums.{i}.arm": 0.0}
     columns |= {f"clutch.coefficients.{k}": 1.0 for k in range(max(1, coefficients))}
     columns |= {"shaft.bearing_damping": 1.0} if drag else {}
+    columns |= {"shaft.stribeck_load": 1.0} if curved else {}
     # Nothing moves, which is periodic: this runs all steps of the search, down to the means.
     settle(columns, SettledRun(tolerance=tolerance), cases=1)
     simulate(columns, Run(tolerance=tolerance), cases=1)

@@ -1,5 +1,6 @@
 """States at the start of an excitation period as parameters, and that in which a case ends."""
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -8,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from sprag_study.engine.endings import ENDINGS, Ending
 from sprag_study.engine.run import Run, SettledRun
 from sprag_study.engine.vibration_drive.automaton import Clutch
-from sprag_study.engine.vibration_drive.cases import case_matrix, pendulum_count, scalars, with_lengths
+from sprag_study.engine.vibration_drive.cases import case_matrix, default_of, pendulum_count, scalars, with_lengths
 from sprag_study.engine.vibration_drive.integration import integrate
 from sprag_study.engine.vibration_drive.kernel import kernel_of
 from sprag_study.engine.vibration_drive.layout import OUT_ENDING
@@ -20,6 +21,7 @@ from sprag_study.engine.vibration_drive.strobes import (
     SHAFT_SPEED,
     SHAFT_WIDTH,
     SPEED,
+    TURN,
     WINDUP,
 )
 from sprag_study.engine.vibration_drive.sweep import whole_periods
@@ -76,5 +78,16 @@ def end_state(
         return {path: values.get(path, 0.0) for path in as_parameters(np.zeros(SHAFT_WIDTH + n * PENDULUM_WIDTH))}
     matrix = with_lengths(case_matrix(values, settings, 1), np.zeros(1), np.array([periods]), windowed=False)
     done = integrate(kernel_of(values, settings.tolerance), matrix, settings, strobes=1)
-    ok = ENDINGS[int(done.sums[0, OUT_ENDING])] is Ending.OK
-    return as_parameters(done.strobes[0, 0]) if ok else None
+    if ENDINGS[int(done.sums[0, OUT_ENDING])] is not Ending.OK:
+        return None
+    row = done.strobes[0, 0]
+    return as_parameters(row) | _later_phase(values, float(row[TURN]))
+
+
+def _later_phase(values: Mapping[str, float], turn: float) -> dict[str, float]:
+    """The phase of a cyclic load after a turn of the shaft in rad; nothing without such a load."""
+    if not values.get("shaft.cyclic_load", 0.0) > 0.0:
+        return {}
+    cycles = values.get("shaft.load_cycles", default_of("shaft.load_cycles"))
+    assert cycles is not None
+    return {"shaft.load_phase": math.remainder(values.get("shaft.load_phase", 0.0) + cycles * turn, 2.0 * math.pi)}

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag_study.engine.compile.jit import inlined, part
+from sprag_study.engine.elementary.angles import cosine
 from sprag_study.engine.taylor.straight import horner, integral, slope
 from sprag_study.engine.vibration_drive.automaton import CLUTCH_THRESHOLD, Band, Clutch, Shaft, Threshold
 from sprag_study.engine.vibration_drive.formulas import beyond
@@ -170,15 +171,27 @@ def count_event(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
 
 
 @part
+def load_at_rest(W: Floats, lay: Layout, lane: int) -> float:
+    """Torque in N*m up to which the load holds a shaft that stands."""
+    load = W[lay.load, lane]
+    if lay.curved == 1:
+        load += W[lay.stribeck, lane] + W[lay.cyclic, lane] * cosine(W[lay.cycle, lane])
+    return float(load)
+
+
+@part
 def is_held(W: Floats, lay: Layout, lane: int) -> bool:
     """Whether the shaft is held when it stands: without a load and a backstop nothing does."""
-    return bool(W[lay.load, lane] > 0.0 or (lay.drag == 1 and W[lay.backstop, lane] > 0.0))
+    dry = W[lay.load, lane]
+    if lay.curved == 1:
+        dry += W[lay.stribeck, lane]
+    return bool(dry > 0.0 or (lay.drag == 1 and W[lay.backstop, lane] > 0.0))
 
 
 @part
 def set_shaft(W: Floats, Z: Ints, lay: Layout, lane: int, state: int) -> None:
     """Put the shaft into a state: its guard, its flag, its mobility."""
-    load = W[lay.load, lane]
+    load = load_at_rest(W, lay, lane)
     Z[lane, SHAFT_STATE] = state
     W[lay.rotating, lane] = 1.0 if state == ROTATING else 0.0
     W[lay.sum_high, lane] = load if state == HELD else NEVER

@@ -33,7 +33,7 @@ def _zero_sums(W: Floats, lay: Layout, lane: int) -> None:
 @part
 def _go_on_from_extrema(W: Floats, lay: Layout, lane: int, sums: Floats) -> None:
     """Take extrema that the row of sums holds already for those of the window: lesser ones are not looked for."""
-    for row in range(lay.speed_max, lay.power_max + 1):
+    for row in range(lay.speed_max, lay.useful_max + 1):
         value = sums[OUT_SUMS + row - lay.sum_held]
         if not math.isnan(value):
             W[row, lane] = value
@@ -74,6 +74,7 @@ def _pass_stop(W: Floats, Z: Ints, lay: Layout, lane: int, stop: int, sums: Floa
         W[lay.input_1, lane] = _input_work(W, lay, lane)
         W[lay.square_1, lane] = W[lay.speed_square, lane]
         W[lay.cube_1, lane] = W[lay.speed_cube, lane]
+        W[lay.curve_1, lane] = W[lay.curve_work, lane]
     elif stop == 2:
         W[lay.turn_2, lane] = W[lay.turn, lane]
         W[lay.speed_2, lane] = W[lay.speed, lane]

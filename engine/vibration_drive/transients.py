@@ -12,7 +12,16 @@ from numpy.typing import ArrayLike, NDArray
 from sprag_study.engine.endings import ENDINGS, Ending
 from sprag_study.engine.outcome import Batch
 from sprag_study.engine.run import Run, SettledRun
-from sprag_study.engine.vibration_drive.cases import STOPS, Column, case_matrix, pendulum_count, stop_column, unloaded
+from sprag_study.engine.vibration_drive.cases import (
+    STOPS,
+    Column,
+    case_matrix,
+    load_at_rest,
+    pendulum_count,
+    stop_column,
+    swings,
+    unloaded,
+)
 from sprag_study.engine.vibration_drive.characteristics import characteristics
 from sprag_study.engine.vibration_drive.integration import integrate
 from sprag_study.engine.vibration_drive.kernel import kernel_of
@@ -63,7 +72,8 @@ def simulate_judged(columns: Mapping[str, ArrayLike], run: Run, *, cases: int) -
     """Run a batch of cases, and judge from their strobes whether they had settled.
 
     Each run is continued from its last strobe until the orbit that it approaches is found, for at most ``TIMES`` times
-    its length and ``MOST`` periods.
+    its length and ``MOST`` periods. One whose load swings with the angle of the shaft has no such orbit and is not
+    judged.
 
     Parameters
     ----------
@@ -86,7 +96,10 @@ def simulate_judged(columns: Mapping[str, ArrayLike], run: Run, *, cases: int) -
         reset=run.reset,
         max_events_per_period=run.max_events_per_period,
     )
-    search = Search(module, matrix, settings)
+    swinging = swings(matrix)
+    followed = matrix.copy()
+    followed[swinging, Column.CYCLIC] = 0.0  # of cases that are not followed
+    search = Search(module, followed, settings)
     kept = search.history.shape[1]
     done = integrate(module, matrix, run, strobes=kept)
     endings = done.sums[:, OUT_ENDING].astype(np.int8)
@@ -94,7 +107,7 @@ def simulate_judged(columns: Mapping[str, ArrayLike], run: Run, *, cases: int) -
     batch = Batch(values, endings)
     duration = np.sum(matrix[:, stop_column(STOPS - 1) : stop_column(STOPS)], axis=1)
     periods = np.floor(duration).astype(np.int64)
-    ran = endings == _OK
+    ran = (endings == _OK) & ~swinging
     search.history[ran] = in_order(done.strobes[ran], periods[ran])
     search.starts[ran] = search.history[ran, -1]
     search.starts[:, TURN] = 0.0
@@ -124,7 +137,7 @@ class _Settled:
         off = np.abs(own - self.seen) > OFF * scale
         matrix = self._search.matrix
         # A shaft that only torques resist that depend on its speed stands in the limit.
-        slows = (matrix[:, Column.LOAD] == 0.0) & ~unloaded(matrix, self._search.kernel.LAYOUT.n)
+        slows = (load_at_rest(matrix) == 0.0) & ~unloaded(matrix, self._search.kernel.LAYOUT.n)
         turn = np.maximum(own[:, 0], self.seen[:, 0]) * matrix[:, Column.PERIOD]
         held = turn <= np.where(slows, _STILL, 0.0)
         return np.where(held, np.any(off[:, 1:], axis=1), off[:, 0])

@@ -61,6 +61,21 @@ def _power(W: Floats, lay: Layout, lane: int, g: Floats) -> None:
         g[k] = value
 
 
+@part
+def _useful_power(W: Floats, lay: Layout, lane: int, g: Floats) -> None:
+    """Like ``series``, but of the power against the load, cut off at the order."""
+    for k in range(lay.order + 1):
+        g[k] = W[lay.curve + k, lane] + W[lay.generator, lane] * W[lay.speed + k, lane]
+        for j in range(k + 1):
+            g[k] += W[lay.quadratic, lane] * W[lay.speed + j, lane] * W[lay.speed + k - j, lane]
+    g[0] += W[lay.load, lane]
+    for k in range(lay.order, -1, -1):
+        value = 0.0
+        for j in range(k + 1):
+            value += g[j] * W[lay.speed + k - j, lane]
+        g[k] = value
+
+
 @inlined
 def _enter(
     W: Floats,
@@ -124,6 +139,9 @@ def collect_peaks(W: Floats, lay: Layout, lane: int, g: Floats, blocks: Floats, 
     if _exceeds(W, lane, lay.x_power_max, lay.x_power_max):
         _power(W, lay, lane, g)
         used = _enter(W, lay, lane, lay.power_max, block, 1.0, g, blocks, meta, used)
+    if lay.curved == 1 and _exceeds(W, lane, lay.x_useful_max, lay.x_useful_max):
+        _useful_power(W, lay, lane, g)
+        used = _enter(W, lay, lane, lay.useful_max, block, 1.0, g, blocks, meta, used)
     block = lay.p_x_phi_max - lay.p_phi_max
     for i in range(lay.n):
         base = lay.pendulums + i * lay.stride
@@ -166,7 +184,7 @@ def settle_peaks(W: Floats, lay: Layout, g: Floats, stack: Floats, blocks: Float
 def watch_extrema(W: Floats, lay: Layout, lane: int, active: bool) -> None:
     """Start the extrema of a lane afresh, or switch them off (then no step can exceed them)."""
     low = -NEVER if active else NEVER
-    for row in (lay.speed_max, lay.acc_max, lay.sum_max, lay.power_max):
+    for row in (lay.speed_max, lay.acc_max, lay.sum_max, lay.power_max, lay.useful_max):
         W[row, lane] = low
     W[lay.speed_min, lane] = -low
     for i in range(lay.n):

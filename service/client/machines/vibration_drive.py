@@ -75,6 +75,13 @@ class DriveShaft(TypedDict, total=False):
     linear_load : Load torque per speed, as of a generator (k_1), N*m*s/rad; >= 0 N*m*s/rad and <= 1e+06 N*m*s/rad.
     quadratic_load : Load torque per square of the speed, as of a fan or a pump (k_2), N*m*s^2/rad^2; >= 0 N*m*s^2/rad^2
         and <= 1e+06 N*m*s^2/rad^2.
+    stribeck_load : Load torque at rest beyond the load torque, which falls exponentially with the speed, as of friction
+        (M_s), N*m; >= 0 N*m and <= 1e+09 N*m.
+    stribeck_speed : Speed at which the Stribeck load has fallen to 1/e (omega_s), rad/s; > 0 rad/s and <= 1e+06 rad/s.
+    cyclic_load : Share of the load torque by which it swings with the angle of the shaft, as of a press or a cam; only
+        in runs of a given time (kappa); >= 0 and <= 1.
+    load_cycles : Cycles of the cyclic load in a turn of the shaft (m); > 0 and <= 1000.
+    load_phase : Phase of the cyclic load at t = 0 (psi), rad; >= -1000 rad and <= 1000 rad.
     initial_speed : Shaft speed at t = 0 (phi_e'(0)), rad/s; >= 0 rad/s and <= 1e+06 rad/s.
     """
 
@@ -83,6 +90,11 @@ class DriveShaft(TypedDict, total=False):
     bearing_damping: Quantity
     linear_load: Quantity
     quadratic_load: Quantity
+    stribeck_load: Quantity
+    stribeck_speed: Quantity
+    cyclic_load: Quantity
+    load_cycles: Quantity
+    load_phase: Quantity
     initial_speed: Quantity
 
 
@@ -153,6 +165,11 @@ class Drive(Studies):
         "shaft.bearing_damping",
         "shaft.linear_load",
         "shaft.quadratic_load",
+        "shaft.stribeck_load",
+        "shaft.stribeck_speed",
+        "shaft.cyclic_load",
+        "shaft.load_cycles",
+        "shaft.load_phase",
         "shaft.initial_speed",
         "clutch.windup_limit",
         "clutch.accuracy",
@@ -181,7 +198,8 @@ class Drive(Studies):
             Fields inertia, mass, arm, spring_rate, spring_arm, damping, backlash, clutch_damping, overrunning_damping,
             initial_angle, initial_speed, initial_windup, initial_clutch, clutch; needed: inertia, mass, arm.
         shaft : values
-            Fields inertia, load, bearing_damping, linear_load, quadratic_load, initial_speed; needed: inertia.
+            Fields inertia, load, bearing_damping, linear_load, quadratic_load, stribeck_load, stribeck_speed,
+            cyclic_load, load_cycles, load_phase, initial_speed; needed: inertia.
         gravity : number or text with a unit, optional
             Gravitational acceleration (g), m/s^2; >= 0 m/s^2 and <= 1000 m/s^2.
         clutch : values, optional

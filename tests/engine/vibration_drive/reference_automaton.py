@@ -31,8 +31,8 @@ class Automaton(Machine):
         n = self.n
         if self.shaft_state == "held":
             if self.is_pushed():
-                yield lambda t, y: self.load - sum(self.torques(t, y)[0]), lambda y, t: self.turn("rotating")
-        elif self.load > 0.0 or self.backstop:
+                yield lambda t, y: self.holds(y) - sum(self.torques(t, y)[0]), lambda y, t: self.turn("rotating")
+        elif self.stops:
             yield lambda t, y: y[self.shaft], self.stop
         for i, p in enumerate(self.pendulums):
             state = self.clutches[i]
@@ -71,6 +71,10 @@ class Automaton(Machine):
                     )
                 if self.literal:
                     yield UpwardCrossing(lead), lambda y, t, i=i: self.interact(i, y, t, crossing=True)
+
+    def holds(self, y: Any) -> Any:
+        """Torque up to which the load holds the shaft."""
+        return self.useful(0.0 * y[self.shaft], y[3 * self.n])
 
     def is_pushed(self) -> bool:
         """Whether any clutch may drive the shaft: one that overruns or takes up its backlash never does."""
@@ -135,7 +139,7 @@ class Automaton(Machine):
         """Transitions that the last one causes at once."""
         for _ in range(50):
             torque, _ = self.torques(t, y)
-            if self.shaft_state == "held" and self.is_pushed() and sum(torque) > self.load + ROUNDING:
+            if self.shaft_state == "held" and self.is_pushed() and sum(torque) > self.holds(y) + ROUNDING:
                 self.shaft_state = "rotating"
             else:
                 for i, p in enumerate(self.pendulums):

@@ -82,6 +82,11 @@ class Machine:
         self.bearing, self.linear, self.quadratic = (
             get(f"shaft.{name}") for name in ("bearing_damping", "linear_load", "quadratic_load")
         )
+        self.stribeck, self.stribeck_speed = get("shaft.stribeck_load"), get("shaft.stribeck_speed", 1.0)
+        self.swing, self.cycles, self.phase = (
+            get(f"shaft.{name}", default)
+            for name, default in (("cyclic_load", 0.0), ("load_cycles", 1.0), ("load_phase", 0.0))
+        )
         law = tuple(get(f"clutch.coefficients.{k}") for k in range(12))
         while len(law) > 1 and law[-1] == 0.0:
             law = law[:-1]
@@ -100,17 +105,17 @@ class Machine:
             for i in range(self.n)
         ]
         # Angles, speeds, windups; shaft's angle and speed; integrals: torque, input, loss, clutch work, angles; square
-        # and cube of the shaft's speed, what the clutches lose.
+        # and cube of the shaft's speed, what the clutches lose, work against the load.
         n = self.n
         self.shaft = 3 * n + 1
-        self.start = np.zeros(5 * n + 8)
+        self.start = np.zeros(5 * n + 9)
         self.start[:n] = [get(f"pendulums.{i}.initial_angle") for i in range(n)]
         self.start[n : 2 * n] = [get(f"pendulums.{i}.initial_speed") for i in range(n)]
         self.start[self.shaft] = get("shaft.initial_speed")
         self.clutches = ["free"] * n
         self.backstop = any(p.overrunning_damping > 0.0 for p in self.pendulums)
-        stops = self.load > 0.0 or self.backstop
-        self.shaft_state = "rotating" if self.start[self.shaft] > 0.0 or not stops else "held"
+        self.stops = self.load > 0.0 or self.stribeck > 0.0 or self.backstop
+        self.shaft_state = "rotating" if self.start[self.shaft] > 0.0 or not self.stops else "held"
 
     def base(self, t: Any) -> tuple[Any, Any]:
         """x'' and y'' of (2)."""
@@ -125,9 +130,11 @@ class Machine:
         drive = p.moment * (ax * cos(phi) + (ay + self.g) * sin(phi))
         return drive - p.spring * phi - p.damping * speed
 
-    def against(self, speed: Any) -> Any:
-        """Torque that resists the rotating shaft."""
-        return self.load + (self.bearing + self.linear) * speed + self.quadratic * speed * np.abs(speed)
+    def useful(self, speed: Any, angle: Any) -> Any:
+        """Torque of the load at a speed and an angle of the shaft; at rest, what it holds."""
+        bent = self.stribeck * np.exp(-speed / self.stribeck_speed)
+        bent = bent + self.load * self.swing * np.cos(self.cycles * angle + self.phase)
+        return self.load + self.linear * speed + self.quadratic * speed * np.abs(speed) + bent
 
     def rate(self, i: int) -> float:
         """Damping of a clutch in its state."""
@@ -147,7 +154,8 @@ class Machine:
         acceleration = 0.0 * t
         if self.shaft_state == "rotating":
             together = self.inertia + sum(self.pendulums[i].inertia for i in locked)
-            acceleration = (sum(sprung) + sum(free.values()) - self.against(y[self.shaft])) / together
+            against = self.useful(y[self.shaft], y[3 * self.n]) + self.bearing * y[self.shaft]
+            acceleration = (sum(sprung) + sum(free.values()) - against) / together
         for i in locked:
             sprung[i] = free[i] - self.pendulums[i].inertia * acceleration
         return sprung, acceleration
@@ -178,4 +186,5 @@ class Machine:
         out[3 * n + 4] += self.bearing * shaft**2
         out[3 * n + 5] = sum(torque) * shaft
         out[4 * n + 6], out[4 * n + 7] = shaft**2, shaft**3
+        out[5 * n + 8] = self.useful(shaft, y[3 * n]) * shaft
         return np.array(out)

@@ -63,8 +63,7 @@ class Drive(Automaton):
         self.out.mean["power.bearing.mean"] = self.bearing * square
         self.out.mean["power.linear.mean"] = self.linear * square
         self.out.mean["power.quadratic.mean"] = self.quadratic * cube
-        useful = self.load * mean[3 * n] + self.linear * square + self.quadratic * cube
-        self.out.mean["power.useful.mean"] = float(useful)
+        self.out.mean["power.useful.mean"] = float(mean[5 * n + 8])
         clutches = mean[4 * n + 8 : 5 * n + 8]
         self.out.mean["power.loss.mean"] += float(np.sum(clutches))
         self.out.mean |= {f"pendulums.{i}.power.clutch_loss": float(clutches[i]) for i in range(n)}
@@ -183,6 +182,7 @@ class Drive(Automaton):
             "shaft.speed.min": -speed,
             "torque.max": sum(torque),
             "power.clutch.max": sum(torque) * speed,
+            "power.useful.max": self.useful(speed, y[3 * n]) * speed,
         }
         for i in range(n):
             out[f"pendulums.{i}.angle.max"], out[f"pendulums.{i}.angle.min"] = y[i], -y[i]

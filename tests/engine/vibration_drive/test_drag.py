@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from sprag_study.engine.endings import Ending
 from sprag_study.engine.run import Reset, Run, SettledRun, Span
@@ -260,6 +261,37 @@ def test_a_resisted_shaft_does_not_turn_back() -> None:
     assert row["shaft.speed.min"] == row["shaft.speed.mean"] == row["shaft.speed.max"] == 0.0
     path = trajectory(columns, periods(4.0, 1.0, 4.0), [0.0, 1e-3])
     assert column(path, "shaft.speed").tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("share", [0.5, 3.0, 30.0])
+def test_a_rectifier_with_a_resistive_load(share: float) -> None:
+    """A heavy pendulum swings, a rigid clutch takes the shaft along, a generator on a resistor brakes it: a diode that
+    feeds a capacitor and a resistor in parallel (O. H. Schade, Proceedings of the IRE 31, 1943), ``share`` = nu R C.
+    """
+    nu, top = 2.0 * math.pi * 20.0, 2.0
+    columns = {
+        "gravity": 0.0, "excitation.frequency": 20.0, "shaft.inertia": J_E, "shaft.load": 0.0, **clutch(1e3, 0.0),
+        "shaft.linear_load": J_E * nu / share,
+        **pendulum(0, inertia=1e5, mass=0.0, damping=0.0, backlash=0.0, spring_rate=1e5 * nu**2, spring_arm=1.0,
+                   initial_angle=-top / nu),
+    }  # fmt: skip
+    # The clutch opens where the torque J_e omega' + k omega of the shaft is 0, and closes where its decay meets the
+    # pendulum's speed again.
+    opens = math.pi - math.atan(share)
+    closes = brentq(lambda x: math.sin(x) - math.sin(opens) * math.exp(-(x + 2.0 * math.pi - opens) / share), 0.0, 1.5)
+    free = math.exp(-(closes + 2.0 * math.pi - opens) / share)
+    turn = math.cos(closes) - math.cos(opens) + math.sin(opens) * share * (1.0 - free)
+    square = 0.5 * (opens - closes) - 0.25 * (math.sin(2.0 * opens) - math.sin(2.0 * closes))
+    square += math.sin(opens) ** 2 * 0.5 * share * (1.0 - free**2)
+    row = one(columns, periods(4.0, 1.0, 4.0))
+    expected = {
+        "shaft.speed.mean": top * turn / (2.0 * math.pi),
+        "shaft.speed.max": top,
+        "shaft.speed.min": top * math.sin(closes),
+        "power.linear.mean": J_E * nu / share * top**2 * square / (2.0 * math.pi),
+        "fraction.driven": (opens - closes) / (2.0 * math.pi),
+    }
+    assert {name: row[name] for name in expected} == pytest.approx(expected, rel=1e-6)
 
 
 # Clutches with damping and drag, between a pendulum and a shaft that nothing else moves.

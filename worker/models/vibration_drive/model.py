@@ -12,11 +12,12 @@ import numpy as np
 
 from sprag_study.engine import Ending, Run, Span
 from sprag_study.engine.catalogue import ResultInfo
-from sprag_study.engine.vibration_drive.cases import has_drag
+from sprag_study.engine.vibration_drive.cases import has_curve, has_drag
 from sprag_study.engine.vibration_drive.clutch import ClutchLawError, check_law
 from sprag_study.engine.vibration_drive.parameters import (
     CLUTCH_COEFFICIENT,
     CLUTCH_WINDUP_LIMIT,
+    CYCLIC,
     MAX_PENDULUMS,
     PARAMETERS,
 )
@@ -108,28 +109,37 @@ _PENDULUM_OF_IT: Final = {
 }  # fmt: skip
 
 _DRAG_OF_IT: Final = {"shaft.bearing_damping": 1e-3, "shaft.quadratic_load": 1e-5}
+_CURVE_OF_IT: Final = {
+    "shaft.stribeck_load": 0.1, "shaft.stribeck_speed": 2.0, "shaft.cyclic_load": 0.5, "shaft.load_cycles": 8.0,
+}  # fmt: skip
 _DRAG_OF_CLUTCHES: Final = {"clutch_damping": 0.05, "overrunning_damping": 1e-4}
 
 _PENDULUM = re.compile(r"pendulums\.(\d+)\.")
 _COEFFICIENT = re.compile(r"(?:^|\.)clutch\.coefficients\.(\d+)$")
 
 
-#: Last part of the key of a kernel with torques that depend on speeds.
+#: Last part of the key of a kernel with torques that depend on speeds, and of one with loads that are no polynomials of
+#: them too.
 _DRAG: Final = "drag"
+_CURVE: Final = "curve"
 
 
 class DriveKey(NamedTuple):
-    """Key of the kernel of a vibration drive; ``drag``: with torques that depend on speeds."""
+    """Key of the kernel of a vibration drive; ``drag``: with torques that depend on speeds, ``curved``: with loads that
+    are no polynomials of the speed too.
+    """
 
     pendulums: int
     coefficients: int
     tolerance: float
     drag: bool = False
+    curved: bool = False
 
     @property
     def shape(self) -> KernelShape:
         """The shape with this key."""
-        return KernelShape(MODEL, (*self[:3], _DRAG) if self.drag else tuple(self[:3]))
+        terms = (_CURVE,) if self.curved else (_DRAG,) if self.drag else ()
+        return KernelShape(MODEL, (*self[:3], *terms))
 
 
 def _paths(study: Study) -> Iterable[str]:
@@ -253,15 +263,19 @@ class VibrationDrive(Model):
         return tuple(replace(info, name=info.name.replace(one, "pendulums.N.")) for info in started_infos(1))
 
     def shape_of(self, study: Study) -> KernelShape:
-        drag = has_drag(_paths(study))
-        return DriveKey(pendulums(study), coefficients(study), run_of(study.run).tolerance, drag).shape
+        drag, curved = has_drag(_paths(study)), has_curve(_paths(study))
+        return DriveKey(pendulums(study), coefficients(study), run_of(study.run).tolerance, drag, curved).shape
 
     def sweeps(self, run: Mapping[str, Any]) -> bool:
         return is_settled(run) and not has_starts(run)
 
     def invalid(self, study: Study, columns: Mapping[str, Any], count: int) -> NDArray[np.bool_]:
-        """The cases with a clutch whose torque is negative somewhere in its range, or zero everywhere."""
+        """The cases with a clutch whose torque is negative somewhere in its range, or zero everywhere; and those with a
+        cyclic load where motion is to settle.
+        """
         found = np.zeros(count, dtype=np.bool_)
+        if is_settled(study.run):
+            found |= np.broadcast_to(np.asarray(columns.get(CYCLIC, 0.0)) > 0.0, count)
         paths = [path for path in columns if ".coefficients." in f".{path}"]
         for prefix in dict.fromkeys(path.partition("coefficients.")[0] for path in paths):
             limit = columns.get(f"{prefix}windup_limit", np.inf)
@@ -341,8 +355,8 @@ class VibrationDrive(Model):
     def known_answers(self, shape: KernelShape) -> bytes:
         from sprag_study.engine.vibration_drive.simulate import simulate
 
-        pendulums, coefficients, tolerance, drag = _key_of(shape)
-        columns = _DRIVEN | (_DRAG_OF_IT if drag else {})
+        pendulums, coefficients, tolerance, drag, curved = _key_of(shape)
+        columns = _DRIVEN | (_DRAG_OF_IT if drag else {}) | (_CURVE_OF_IT if curved else {})
         swinging = _PENDULUM_OF_IT | (_DRAG_OF_CLUTCHES if drag else {})
         for number in range(pendulums):
             columns |= {f"pendulums.{number}.{name}": value for name, value in swinging.items()}
@@ -451,4 +465,6 @@ def _is_law(law: NDArray[np.float64]) -> bool:
 
 
 def _key_of(shape: KernelShape) -> DriveKey:
-    return DriveKey(*cast("tuple[int, int, float]", shape.key[:3]), drag=shape.key[3:] == (_DRAG,))
+    terms = shape.key[3:]
+    numbers = cast("tuple[int, int, float]", shape.key[:3])
+    return DriveKey(*numbers, drag=terms in {(_DRAG,), (_CURVE,)}, curved=terms == (_CURVE,))

@@ -48,6 +48,10 @@ def _phases(names: Sequence[str]) -> tuple[tuple[str, str, str], ...]:
     return tuple((f"{pendulum}.angle", f"{pendulum}.speed", _title(pendulum)) for pendulum in _pendulums(names))
 
 
+_LOADS: Final = (
+    *("bearing_damping", "linear_load", "quadratic_load", "stribeck_load", "stribeck_speed"),
+    *("cyclic_load", "load_cycles", "load_phase"),
+)
 _POINT: Final = ("excitation.frequency", "excitation.amplitude_x", "excitation.amplitude_y", "shaft.load")
 
 PRESENTATION: Final = Presentation(
@@ -127,7 +131,7 @@ PRESENTATION: Final = Presentation(
         ),
         "shaft.initial_speed": "theory#the-automaton",
         **{f"pendulums.{name}": "theory#the-clutches" for name in ("clutch_damping", "overrunning_damping")},
-        **{f"shaft.{name}": "theory#the-load" for name in ("load", "bearing_damping", "linear_load", "quadratic_load")},
+        **{f"shaft.{name}": "theory#the-load" for name in ("load", *_LOADS)},
         **{
             f"{clutch}.{name}": "theory#clutch-law-from-measured-data"
             for clutch in ("clutch", "pendulums.clutch")

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from sprag_study.engine.vibration_drive.parameters import DRAG
+from sprag_study.engine.vibration_drive.parameters import CURVE, DRAG
 from sprag_study.worker.limits import MAX_CLUTCH_ROWS
 from sprag_study.worker.models import MAX_COEFFICIENTS, MAX_PENDULUMS, ONLY_GIVEN, parameter_catalogue, shape_of
 from tests.service.spec_sample import SPEC, parsed, problems
@@ -218,6 +218,30 @@ def test_a_torque_that_depends_on_speeds_is_part_of_a_study_only_where_it_is_giv
         on_axis = parsed({"/axes/2": {"path": path, "values": [0, 1e-3]}}).study
         assert path not in on_axis.base
         assert shape_of(on_axis) == shape_of(parsed({pointer: 2e-3}).study) != shape_of(parsed({}).study)
+
+
+@pytest.mark.parametrize("name", sorted(CURVE))
+def test_a_load_that_is_no_polynomial_is_part_of_a_study_only_where_it_is_given(name: str) -> None:
+    timed = {"/run": {"duration": "40 periods"}}
+    pointer, path = f"/base/shaft/{name}", f"shaft.{name}"
+    given = parsed({**timed, pointer: 0.5}).study
+    assert given.base.items() - parsed(timed).study.base.items() == {(path, 0.5)}
+    on_axis = parsed({**timed, "/axes/2": {"path": path, "values": [0.5, 0.6]}}).study
+    assert path not in on_axis.base
+    dragged = parsed({**timed, "/base/shaft/linear_load": 1e-3}).study
+    assert shape_of(on_axis) == shape_of(given) not in (shape_of(dragged), shape_of(parsed(timed).study))
+
+
+def test_a_cyclic_load_has_no_settled_motion() -> None:
+    for change in (
+        {"/base/shaft/cyclic_load": 0.2},
+        {"/axes/2": {"path": "shaft.cyclic_load", "values": [0, 0.2]}},
+        {"/derive": {"shaft.cyclic_load": "shaft.load/(2 N*m)"}},
+    ):
+        message = problems({"/run": {"until": "settled"}, **change})["/run"].message
+        assert "shaft.cyclic_load" in message
+        parsed({"/run": {"duration": "40 periods"}, **change})
+    parsed({"/run": {"until": "settled"}, "/base/shaft/cyclic_load": 0})
 
 
 def test_units_of_a_load_that_rises_with_the_speed() -> None:
