@@ -9,9 +9,9 @@ import math
 import numpy as np
 
 from sprag_study.engine.compile.jit import bits_of, inlined, of_bits, part
-from sprag_study.engine.taylor.straight import ROUND
+from sprag_study.engine.taylor.straight import EXPONENTIAL, LN2, ROUND
 
-_LN2_HIGH, _LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
+_LN2_HIGH, _LN2_LOW = (float(text) for text in LN2)
 _SQRT_TWO = 1.4142135623730951
 _L1, _L2, _L3, _L4, _L5, _L6, _L7 = (
     6.666666666666735130e-01,
@@ -22,13 +22,7 @@ _L1, _L2, _L3, _L4, _L5, _L6, _L7 = (
     1.531383769920937332e-01,
     1.479819860511658591e-01,
 )
-_E1, _E2, _E3, _E4, _E5 = (
-    1.66666666666666019037e-01,
-    -2.77777777770155933842e-03,
-    6.61375632143793436117e-05,
-    -1.65339022054652515390e-06,
-    4.13813679705723846039e-08,
-)
+_E1, _E2, _E3, _E4, _E5 = (float(text) for text in EXPONENTIAL)
 #: Beyond these the exponential is infinite, or 0.
 _HIGHEST, _LOWEST, _BEYOND = 709.782712893384, -745.2, 800.0
 #: 2/3 and what its double lacks.

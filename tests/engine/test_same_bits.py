@@ -91,6 +91,11 @@ for name in ("slotter", "two_cylinder_compressor", "conveyor", "one_pendulum"):
         document = load_spec(text[1], text[0].rpartition(".")[2])
         document["base"]["operation"] = {"quantity": "torque", "formula": formula}
         found["formula"] = digest(models.run_chunk(parse_spec(document).study, 0, 3).values)
+    if name == "one_pendulum":
+        document = load_spec(text[1], text[0].rpartition(".")[2])
+        document["base"]["shaft"] |= {"stribeck_load": 0.05, "stribeck_speed": 3.0, "cyclic_load": 0.5}
+        document["run"] = {"duration": "40 periods"}
+        found["loads"] = digest(models.run_chunk(parse_spec(document).study, 0, 12).values)
 angles = np.linspace(-9.0, 9.0, 999)
 print(json.dumps([found, digest(np.sin(angles)), digest(np.array([math.pow(1.0 + abs(a), a) for a in angles]))]))
 """

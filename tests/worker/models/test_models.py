@@ -163,3 +163,14 @@ def test_torques_that_depend_on_speeds_need_another_kernel() -> None:
     assert (found.values[:, column] > 0.0).all()
     known = models.model_of("vibration-drive").known_answers
     assert known(shape) != known(models.shape_of(study))
+    curved = models.shape_of(replace(given, base=given.base | {"shaft.stribeck_load": 0.1}))
+    assert curved.key == (1, 4, 1e-9, "curve")
+    assert len({known(curved), known(shape), known(models.shape_of(study))}) == 3
+
+
+def test_a_drawn_case_with_a_cyclic_load_is_no_machine_where_motion_is_to_settle() -> None:
+    model, study = models.model_of("vibration-drive"), fakes.study(3)
+    columns = {"shaft.cyclic_load": np.array([0.0, 0.1, 1.0]), "clutch.coefficients.0": 1.0}
+    settled = replace(study, run={"until": "settled", "at_most": 1000})
+    assert model.invalid(settled, columns, 3).tolist() == [False, True, True]
+    assert not model.invalid(replace(study, run={"duration": [40.0, "periods"]}), columns, 3).any()
