@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from benchmarks.workloads import CASES, W1, W2
 from sprag_study.engine.run import Run, SettledRun
 from sprag_study.engine.vibration_drive import orbits
-from sprag_study.engine.vibration_drive.cases import case_matrix, pendulum_count, with_lengths
+from sprag_study.engine.vibration_drive.cases import case_matrix, pendulum_count, turns_freely, with_lengths
 from sprag_study.engine.vibration_drive.characteristics import characteristics, combined
 from sprag_study.engine.vibration_drive.integration import Integration, integrate
 from sprag_study.engine.vibration_drive.kernel import kernel_of
@@ -28,7 +28,7 @@ from sprag_study.engine.vibration_drive.regimes import Regime, means, settled_in
 from sprag_study.engine.vibration_drive.results import result_infos
 from sprag_study.engine.vibration_drive.settle import SettledBatch, settle
 from sprag_study.engine.vibration_drive.simulate import simulate
-from sprag_study.engine.vibration_drive.strobes import SHAFT_SPEED
+from sprag_study.engine.vibration_drive.strobes import PENDULUM_WIDTH, SHAFT_SPEED, SHAFT_WIDTH
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -172,14 +172,18 @@ def _orders(strobes: Floats, matrix: Floats) -> Ints:
     """Least order of each case up to 64, by comparing the last strobes; 0: none."""
     cases, kept = len(strobes), 2 * _HIGHEST + 2
     last = np.ascontiguousarray(strobes[:, -kept:])
-    units = np.empty((cases, last.shape[2]))
-    orbits.find_units(last, np.arange(cases), kept, 40, matrix[:, 0].copy(), False, units)
+    units, free = (
+        np.empty((cases, last.shape[2])),
+        turns_freely(matrix, (last.shape[2] - SHAFT_WIDTH) // PENDULUM_WIDTH),
+    )
+    orbits.find_units(last, np.arange(cases), kept, 40, matrix[:, 0].copy(), False, free, units)
     found = np.zeros(cases, dtype=np.int64)
     for case in range(cases):
         for order in range(1, _HIGHEST + 1):
             apart = np.empty(order)
             now, before = last[case, kept - order :], last[case, kept - 2 * order : kept - order]
-            orbits.distances(now.copy(), before.copy(), np.repeat(units[case : case + 1], order, axis=0), apart)
+            unit, springless = (np.repeat(rows[case : case + 1], order, axis=0) for rows in (units, free))
+            orbits.distances(now.copy(), before.copy(), unit, springless, apart)
             if apart.max() < 1e-9:
                 found[case] = order
                 break

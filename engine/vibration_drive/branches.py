@@ -17,7 +17,7 @@ from sprag_study.engine.vibration_drive.characteristics import characteristics
 from sprag_study.engine.vibration_drive.integration import integrate
 from sprag_study.engine.vibration_drive.kernel import Kernel, kernel_of
 from sprag_study.engine.vibration_drive.orbits import find_units
-from sprag_study.engine.vibration_drive.regimes import Regime
+from sprag_study.engine.vibration_drive.regimes import Regime, angles_without_meaning
 from sprag_study.engine.vibration_drive.results import OF_RUNS, result_infos
 from sprag_study.engine.vibration_drive.return_map import DriveMap, Machines
 from sprag_study.engine.vibration_drive.settle import settle
@@ -112,19 +112,22 @@ def branch(
         raise NoOrbitError(joined(": ", (NO_ORBIT, Sentence(what))))
     order = int(found.orders[0])
     kernel = kernel_of(columns, settings.tolerance)
-    units = _units(kernel, case_matrix(columns, settings.fine, 1), settings, found.points, order)
-    map_ = DriveMap(kernel, machines, bounds, settings.fine, order, found.points[0], units)
+    turns_over = found.windings != 0
+    units = _units(kernel, case_matrix(columns, settings.fine, 1), settings, found.points, order, turns_over)
+    map_ = DriveMap(kernel, machines, bounds, settings.fine, order, found.points[0], units, found.windings[0])
     made = follow(map_, map_.point(found.points[0]).tolist(), parameter, along)
     values = _results(map_, made.points)
     return DriveBranch(order, made.points, values, made.specials, made.ends, made.start)
 
 
-def _units(kernel: Kernel, matrix: Floats, settings: SettledRun, start: Floats, order: int) -> Floats:
+def _units(
+    kernel: Kernel, matrix: Floats, settings: SettledRun, start: Floats, order: int, turns_over: NDArray[np.bool_]
+) -> Floats:
     """Scales of the strobes' columns, from one turn of the orbit."""
     turn = with_lengths(matrix, start[:, BEGIN], np.array([float(order)]), windowed=False)
     strobes = integrate(kernel, turn, settings.fine, starts=start, strobes=order).strobes
     units = np.empty((1, start.shape[1]))
-    find_units(strobes, np.zeros(1, dtype=np.int64), order, order, matrix[:, Column.NU], False, units)
+    find_units(strobes, np.zeros(1, dtype=np.int64), order, order, matrix[:, Column.NU], False, turns_over, units)
     own: Floats = units[0]
     return own
 
@@ -136,5 +139,7 @@ def _results(map_: DriveMap, points: tuple[Point, ...]) -> Floats:
     matrix = with_lengths(matrix, states[:, BEGIN], np.full(len(points), float(map_.order)), windowed=True)
     sums = integrate(map_.kernel, matrix, map_.run, starts=states).sums
     kept = [info.name not in OF_RUNS for info in result_infos(map_.kernel.LAYOUT.n)]
-    values: Floats = characteristics(map_.kernel.LAYOUT, matrix, sums)[:, kept]
+    every = characteristics(map_.kernel.LAYOUT, matrix, sums)
+    every[angles_without_meaning(np.tile(map_.windings, (len(points), 1)))] = np.nan
+    values: Floats = every[:, kept]
     return values

@@ -146,6 +146,14 @@ def unloaded(matrix: Floats, pendulums: int) -> NDArray[np.bool_]:
     return free
 
 
+def turns_freely(matrix: Floats, pendulums: int) -> NDArray[np.bool_]:
+    """Which pendulums have no spring, so that one that has turned over is where it was, shape (cases, pendulums)."""
+    width = (matrix.shape[1] - stop_column(STOPS)) // pendulums
+    springs = matrix[:, stop_column(STOPS) + PendulumColumn.SPRING :: width]
+    free: NDArray[np.bool_] = springs == 0.0
+    return free
+
+
 def inertia_ratio(matrix: Floats, pendulums: int) -> Floats:
     """Inertia of the shaft of each case of a matrix over that of its pendulums together, shape (cases,)."""
     width = (matrix.shape[1] - stop_column(STOPS)) // pendulums

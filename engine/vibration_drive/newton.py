@@ -22,6 +22,7 @@ Flags = NDArray[np.bool_]
 _SQUARINGS = 44
 #: Columns of the report of `step` about a point: scaled residual, scaled step, multiplier, whether the states agree.
 RESIDUAL, STEP, MULTIPLIER, AGREES = range(4)
+_TURN = 2.0 * math.pi
 
 
 @compiled
@@ -170,10 +171,11 @@ def step(
     size: float,
     steady_shaft: bool,
     tied: Flags,
+    windings: Ints,
     moved: Floats,
     told: Floats,
 ) -> None:
-    """Newton's step for fixed points of the iterated strobe map.
+    """Newton's step for fixed points of the iterated strobe map, up to whole turns of the pendulums.
 
     Parameters
     ----------
@@ -184,6 +186,8 @@ def step(
         As of `disturb`.
     tied : array, shape (points, pendulums)
         Clutches that stay as they are between pendulum and a held shaft (`characteristics.tied_clutches`).
+    windings : array, shape (points, pendulums)
+        Whole turns that each pendulum makes from a point to its end state.
     moved : array, shape (points, columns)
         Gets the points after the step.
     told : array, shape (points, 4)
@@ -209,7 +213,10 @@ def step(
             for j in range(n):
                 change = ends[first[k] + 1 + j, columns[i]] - base[columns[i]]
                 jacobian[i, j] = change / (units[k, columns[i]] * size)
-            move[i] = (base[columns[i]] - points[k, columns[i]]) / units[k, columns[i]]
+            apart = base[columns[i]] - points[k, columns[i]]
+            if columns[i] >= SHAFT_WIDTH and (columns[i] - SHAFT_WIDTH) % PENDULUM_WIDTH == ANGLE:
+                apart -= _TURN * windings[k, (columns[i] - SHAFT_WIDTH) // PENDULUM_WIDTH]
+            move[i] = apart / units[k, columns[i]]
         residual = 0.0
         for i in range(n):
             residual = max(residual, abs(move[i]))

@@ -25,6 +25,8 @@ Floats = NDArray[np.float64]
 
 #: Samples per period; cubic interpolation between them is accurate to 1e-11 of the speed.
 _SAMPLES = 4096
+#: Relative height above the smallest sample at which a pendulum is slower than a shaft at both ends of a whole turn.
+_ABOVE = 1e-9
 
 
 def limit_speed(times: Floats, angle: Floats, speed: Floats, acceleration: Floats, backlash: float) -> float:
@@ -48,15 +50,23 @@ def limit_speed(times: Floats, angle: Floats, speed: Floats, acceleration: Float
 
     if not (top > 0.0 and short_of(0.0) >= 0.0):
         return math.nan
-    return _root(short_of, top, xtol=1e-14 * top, rtol=1e-14)
+    low = 0.0
+    if np.min(speed) > 0.0:
+        # A pendulum that never turns back takes up any backlash against a shaft below its smallest speed.
+        low = float(np.min(speed)) * (1.0 + _ABOVE)
+        if low >= top or short_of(low) <= 0.0:
+            return -_largest(times, -speed, -acceleration)
+    return _root(short_of, top, xtol=1e-14 * top, rtol=1e-14, low=low)
 
 
-def _root(function: Callable[[float], float], high: float, xtol: float, rtol: float = 2.0**-50) -> float:
-    """Where a function that changes its sign between 0 and ``high`` is 0."""
+def _root(
+    function: Callable[[float], float], high: float, xtol: float, rtol: float = 2.0**-50, low: float = 0.0
+) -> float:
+    """Where a function that changes its sign between ``low`` and ``high`` is 0."""
     # It takes nearly a second to load, and few studies have cases without a load.
     from scipy.optimize import brentq
 
-    return float(brentq(function, 0.0, high, xtol=xtol, rtol=rtol))
+    return float(brentq(function, low, high, xtol=xtol, rtol=rtol))
 
 
 def _hermite(times: Floats, speed: Floats, acceleration: Floats, k: int) -> tuple[float, float, float, float]:

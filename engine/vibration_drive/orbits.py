@@ -2,6 +2,7 @@
 
 All of it works on one case, in fixed order and without a library of linear algebra, so that a case's bits do not
 depend on its batch. Distances are scaled: speeds by the case's largest speed at recent strobes, angles by that over nu.
+A pendulum without a spring that has turned over is where it was: its angles may count without whole turns.
 """
 
 import math
@@ -34,6 +35,7 @@ _ROTATING = float(Shaft.ROTATING)
 _ARRIVED = 1e-9
 #: A longer order is tried instead of a shorter one if it repeats strobes this much better.
 _BETTER = 0.03
+_TURN = 2.0 * math.pi
 
 
 @part
@@ -48,10 +50,28 @@ def same_states(a: Floats, b: Floats) -> bool:
 
 
 @part
-def distance(a: Floats, b: Floats, unit: Floats) -> float:
+def whole_turns(angle: float) -> float:
+    """The number of whole turns that is nearest to an angle in rad."""
+    return math.floor(angle / _TURN + 0.5)
+
+
+@part
+def _count_turns(a: Floats, b: Floats, free: Flags, windings: Ints) -> bool:
+    """Write the whole turns that pendulums without a spring have made from strobe ``b`` to ``a``; whether any has."""
+    turned = False
+    for i in range(windings.shape[0]):
+        angle = SHAFT_WIDTH + i * PENDULUM_WIDTH + ANGLE
+        windings[i] = int(whole_turns(a[angle] - b[angle])) if free[i] else 0
+        turned |= windings[i] != 0
+    return turned
+
+
+@part
+def distance(a: Floats, b: Floats, unit: Floats, windings: Ints) -> float:
     """Largest scaled difference of two strobes; infinite where the states of clutches or shaft differ.
 
-    ``unit`` has a column for each of a strobe's: what counts as 1.
+    ``unit`` has a column for each of a strobe's: what counts as 1. ``windings`` are the whole turns that each pendulum
+    has made from ``b`` to ``a``, which do not count.
     """
     if not same_states(a, b):
         return math.inf
@@ -60,28 +80,36 @@ def distance(a: Floats, b: Floats, unit: Floats) -> float:
         for k in (ANGLE, SPEED, WINDUP):
             if k == WINDUP and (a[column + CLUTCH] == _FREE or a[column + CLUTCH] == _LOCKED):
                 continue
-            largest = max(largest, abs(a[column + k] - b[column + k]) / unit[column + k])
+            apart = a[column + k] - b[column + k]
+            if k == ANGLE:
+                apart -= _TURN * windings[(column - SHAFT_WIDTH) // PENDULUM_WIDTH]
+            largest = max(largest, abs(apart) / unit[column + k])
     return float(largest)
 
 
 @part
-def _spread(a: Floats, b: Floats, unit: Floats) -> float:
-    """Largest scaled difference of the speeds and angles of two strobes, whatever their states."""
+def _spread(a: Floats, b: Floats, unit: Floats, windings: Ints) -> float:
+    """Largest scaled difference of the speeds and angles of two strobes, whatever their states; ``windings`` are those
+    of `distance`.
+    """
     largest = abs(a[SHAFT_SPEED] - b[SHAFT_SPEED]) / unit[SHAFT_SPEED]
     for column in range(SHAFT_WIDTH, a.shape[0], PENDULUM_WIDTH):
         for k in (ANGLE, SPEED):
-            largest = max(largest, abs(a[column + k] - b[column + k]) / unit[column + k])
+            apart = a[column + k] - b[column + k]
+            if k == ANGLE:
+                apart -= _TURN * windings[(column - SHAFT_WIDTH) // PENDULUM_WIDTH]
+            largest = max(largest, abs(apart) / unit[column + k])
     return float(largest)
 
 
 @part
-def _apart(strobes: Floats, last: int, length: int, order: int, unit: Floats, enough: float) -> float:
+def _apart(strobes: Floats, last: int, length: int, order: int, unit: Floats, windings: Ints, enough: float) -> float:
     """Largest distance of the ``length`` strobes up to ``last`` from those ``order`` periods before them, or some
     distance above ``enough``.
     """
     largest = 0.0
     for j in range(last, last - length, -1):
-        largest = max(largest, distance(strobes[j], strobes[j - order], unit))
+        largest = max(largest, distance(strobes[j], strobes[j - order], unit, windings))
         if largest > enough:
             break
     return largest
@@ -109,7 +137,7 @@ def keep_strobes(history: Floats, cases: Ints, strobes: Floats) -> None:
 
 @compiled
 def find_units(
-    strobes: Floats, cases: Ints, count: int, recent: int, nu: Floats, steady_shaft: bool, units: Floats
+    strobes: Floats, cases: Ints, count: int, recent: int, nu: Floats, steady_shaft: bool, free: Flags, units: Floats
 ) -> None:
     """Write the scale of every column of the strobes of some cases.
 
@@ -123,6 +151,8 @@ def find_units(
     nu : array, shape (cases,)
     steady_shaft : bool
         Whether the shaft's speed is left out.
+    free : array, shape (cases, pendulums)
+        Pendulums whose angles count without whole turns.
     units : array, shape (cases, columns)
     """
     for case in range(cases.shape[0]):
@@ -132,7 +162,10 @@ def find_units(
             if not steady_shaft:
                 speed = max(speed, abs(row[SHAFT_SPEED]))
             for column in range(SHAFT_WIDTH, row.shape[0], PENDULUM_WIDTH):
-                speed = max(speed, abs(row[column + SPEED]), abs(row[column + ANGLE]) * nu[case])
+                angle = row[column + ANGLE]
+                if free[case, (column - SHAFT_WIDTH) // PENDULUM_WIDTH]:
+                    angle -= _TURN * whole_turns(angle)
+                speed = max(speed, abs(row[column + SPEED]), abs(angle) * nu[case])
         unit = units[case]
         unit[:] = 1.0
         unit[SHAFT_SPEED] = speed
@@ -151,6 +184,8 @@ def find_candidates(
     shared: float,
     window: int,
     max_order: int,
+    free: Flags,
+    windings: Ints,
     found: Ints,
 ) -> None:
     """Write the order of an orbit that each case seems to approach, or 0.
@@ -160,22 +195,33 @@ def find_candidates(
     orbit moves ever faster. The least such order counts, unless strobes come much nearer after a longer one: beside an
     orbit whose period has doubled, strobes also nearly repeat after half of it. ``strobes``, ``cases`` and ``count``
     are as of `find_units`.
+
+    A case with pendulums that are ``free`` (shape (cases, pendulums)) seems to approach an orbit along which one of
+    them turns over; ``windings``, of this shape, gets the whole turns of each.
     """
     last = strobes.shape[1] - 1
+    turns = np.zeros(free.shape[1], dtype=np.int64)
     for case in range(cases.shape[0]):
         found[case] = 0
+        windings[case] = 0
+        rotates = False
+        for i in range(free.shape[1]):
+            rotates |= free[case, i]
         own = strobes[cases[case]]
         best = math.inf
         for order in range(1, max_order + 1):
             length = max(order, window)
             if count < 2 * length + order:
                 break
+            if rotates and not _count_turns(own[last], own[last - order], free[case], turns):
+                continue
             enough = min(near, shared / order, best)
-            now = _apart(own, last, length, order, units[case], enough)
+            now = _apart(own, last, length, order, units[case], turns, enough)
             if now > enough:
                 continue
-            if now < _apart(own, last - length, length, order, units[case], now) or now < _ARRIVED:
+            if now < _apart(own, last - length, length, order, units[case], turns, now) or now < _ARRIVED:
                 found[case] = order
+                windings[case] = turns
                 best = _BETTER * now
 
 
@@ -188,6 +234,7 @@ def find_approaching(
     orders: Ints,
     units: Floats,
     multipliers: Floats,
+    free: Flags,
     found: Flags,
 ) -> None:
     """Write whether runs come nearer to their orbits, at no less than half the rate of the orbits' multipliers.
@@ -203,17 +250,24 @@ def find_approaching(
         Strobes of the turn that begins at the orbit's point nearest to the newest strobe.
     orders, multipliers : array, shape (cases,)
     units : array, shape (cases, columns)
+    free : array, shape (cases, pendulums)
+        As of `find_units`.
     found : array, shape (cases,)
     """
     last = strobes.shape[1] - 1
     third = count // 3
+    windings = np.zeros(free.shape[1], dtype=np.int64)
     for case in range(cases.shape[0]):
         own, order = strobes[cases[case]], orders[case]
         early = late = 0.0
         for k in range(third):
-            newer = _spread(own[last - k], turns[case, (order - 1 - k) % order], units[case])
+            at = turns[case, (order - 1 - k) % order]
+            _count_turns(own[last - k], at, free[case], windings)
+            newer = _spread(own[last - k], at, units[case], windings)
             before = k + 2 * third
-            older = _spread(own[last - before], turns[case, (order - 1 - before) % order], units[case])
+            at = turns[case, (order - 1 - before) % order]
+            _count_turns(own[last - before], at, free[case], windings)
+            older = _spread(own[last - before], at, units[case], windings)
             early, late = max(early, older), max(late, newer)
         rate = logarithm(multipliers[case]) / order if multipliers[case] > 0.0 else -math.inf
         found[case] = third > 0 and late < early * exponential(rate * third)
@@ -251,7 +305,9 @@ def tie(state: Floats) -> None:
 
 
 @compiled
-def find_least(points: Floats, strobes: Floats, orders: Ints, units: Floats, same: float, least: Ints) -> None:
+def find_least(
+    points: Floats, strobes: Floats, orders: Ints, windings: Ints, units: Floats, same: float, least: Ints
+) -> None:
     """Write the least divisor of each order after which an orbit is back at its point already.
 
     Parameters
@@ -260,15 +316,22 @@ def find_least(points: Floats, strobes: Floats, orders: Ints, units: Floats, sam
     strobes : array, shape (orbits, strobes, columns)
         Of the run that begins at the point.
     orders : array, shape (orbits,)
+    windings : array, shape (orbits, pendulums)
+        Whole turns of each pendulum in that many periods.
     units : array, shape (orbits, columns)
     same : float
         Scaled distance below which strobes are the same.
     least : array, shape (orbits,)
     """
+    turns = np.zeros(windings.shape[1], dtype=np.int64)
     for k in range(points.shape[0]):
         least[k] = orders[k]
         for order in range(1, orders[k]):
-            if orders[k] % order == 0 and distance(points[k], strobes[k, order - 1], units[k]) < same:
+            whole = orders[k] % order == 0
+            for i in range(windings.shape[1]):
+                whole &= windings[k, i] * order % orders[k] == 0
+                turns[i] = windings[k, i] * order // orders[k]
+            if whole and distance(strobes[k, order - 1], points[k], units[k], turns) < same:
                 least[k] = order
                 break
 
@@ -298,12 +361,13 @@ def growth(
         Gets the scaled difference at the last strobe that counts, its largest component 1 in modulus; ones where none
         counts.
     """
+    windings = np.zeros((base.shape[2] - SHAFT_WIDTH) // PENDULUM_WIDTH, dtype=np.int64)
     for case in range(base.shape[0]):
         grown[case] = 0.0
         periods[case] = 0
         direction[case] = 1.0
         for k in range(base.shape[1]):
-            apart = _spread(base[case, k], other[case, k], units[case])
+            apart = _spread(base[case, k], other[case, k], units[case], windings)
             if not 0.0 < apart < most:
                 break
             grown[case] = logarithm(apart / start)
@@ -326,7 +390,28 @@ def settling_periods(apart: Floats, orders: Ints, multipliers: Floats, settled: 
 
 
 @compiled
-def distances(a: Floats, b: Floats, units: Floats, found: Floats) -> None:
-    """Write the distance of each row of ``a`` to the row of ``b``."""
+def distances(a: Floats, b: Floats, units: Floats, free: Flags, found: Floats) -> None:
+    """Write the distance of each row of ``a`` to the row of ``b``, where pendulums are ``free`` (shape (rows,
+    pendulums)) without whole turns.
+    """
+    windings = np.zeros(free.shape[1], dtype=np.int64)
     for k in range(a.shape[0]):
-        found[k] = distance(a[k], b[k], units[k])
+        _count_turns(a[k], b[k], free[k], windings)
+        found[k] = distance(a[k], b[k], units[k], windings)
+
+
+@compiled
+def without_turns(strobes: Floats, free: Flags) -> None:
+    """Take whole turns from angles, in place, so that they are between -pi and pi.
+
+    Parameters
+    ----------
+    strobes : array, shape (cases, strobes, columns)
+    free : array, shape (cases, pendulums)
+        The pendulums whose angles these are.
+    """
+    for case in range(strobes.shape[0]):
+        for i in range(free.shape[1]):
+            angle = SHAFT_WIDTH + i * PENDULUM_WIDTH + ANGLE
+            for k in range(strobes.shape[1] if free[case, i] else 0):
+                strobes[case, k, angle] -= _TURN * whole_turns(strobes[case, k, angle])

@@ -13,6 +13,7 @@ from sprag_study.engine.vibration_drive.cases import case_matrix, pendulum_count
 from sprag_study.engine.vibration_drive.integration import integrate
 from sprag_study.engine.vibration_drive.kernel import kernel_of
 from sprag_study.engine.vibration_drive.layout import OUT_ENDING
+from sprag_study.engine.vibration_drive.orbits import without_turns
 from sprag_study.engine.vibration_drive.regimes import Regime, settled_infos
 from sprag_study.engine.vibration_drive.settle import settle
 from sprag_study.engine.vibration_drive.simulate import CLUTCH_NAMES, SHAFT_NAMES
@@ -88,7 +89,7 @@ def settled_portrait(columns: Mapping[str, ArrayLike], settings: SettledRun, sta
     periods = settings.at_most
     if regime.repeats and row["regime.settled_after"] < periods:
         periods = min(periods, max(_LEAST, int(np.ceil(row["regime.settled_after"])) + _TURNS * order))
-    _, strobes = _strobes(values, run, periods, start)
+    _, strobes = _strobes(values, run, periods, start, found.windings != 0)
     if not order:
         return Portrait(regime.name.lower() if regime else "", 0, strobes, nothing(), 0, ending)
     each = max(_LEAST_POINTS, min(_POINTS, _ALL_POINTS // order))
@@ -97,16 +98,25 @@ def settled_portrait(columns: Mapping[str, ArrayLike], settings: SettledRun, sta
 
 
 def _strobes(
-    values: Mapping[str, float], run: Run, periods: int, start: Floats | None = None
+    values: Mapping[str, float],
+    run: Run,
+    periods: int,
+    start: Floats | None = None,
+    turns_over: NDArray[np.bool_] | None = None,
 ) -> tuple[Ending, Trajectory]:
-    """How the case ends, and its last strobes."""
+    """How the case ends, and its last strobes; angles of pendulums that turn over (shape (1, pendulums)) are between
+    -pi and pi.
+    """
     n = pendulum_count(values)
     matrix = with_lengths(case_matrix(values, run, 1), np.zeros(1), np.array([float(periods)]), windowed=False)
     kept = min(periods, MAX_STROBES)
     done = integrate(kernel_of(values, run.tolerance), matrix, run, starts=start, strobes=kept)
     ending = ENDINGS[int(done.sums[0, OUT_ENDING])]
     # A run that did not end ok has no more than its first strobes.
-    rows = in_order(done.strobes, np.array([periods]))[0] if kept else done.strobes[0]
+    last = in_order(done.strobes, np.array([periods])) if kept else done.strobes
+    if turns_over is not None:
+        without_turns(last, turns_over)
+    rows = last[0]
     told = ~np.isnan(rows[:, SHAFT])
     rows, numbers = rows[told], np.arange(periods - kept, periods)[told]
     names, units, columns = ["shaft.speed"], ["rad/s"], [rows[:, SHAFT_SPEED]]

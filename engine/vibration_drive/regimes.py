@@ -81,6 +81,39 @@ _OWN = (
 )
 
 
+def winding(pendulum: int) -> str:
+    """Name of the result that counts the whole turns of a pendulum in one turn of the orbit."""
+    return f"pendulums.{pendulum}.winding"
+
+
+def _windings(pendulums: int) -> tuple[ResultInfo, ...]:
+    what = (
+        "whole turns of the pendulum, counter-clockwise, in the regime.order excitation periods after which the motion "
+        "repeats itself; 0 where it swings"
+    )
+    return tuple(ResultInfo(winding(i), "1", what, "count", generation=3) for i in range(pendulums))
+
+
+def angles_without_meaning(windings: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which results of orbits are the mean, the extremes or the amplitude of the angle of a pendulum that turns over.
+
+    Parameters
+    ----------
+    windings : array, shape (orbits, pendulums)
+
+    Returns
+    -------
+    array, shape (orbits, results)
+        Results in the order of ``result_infos``.
+    """
+    names = [info.name for info in result_infos(windings.shape[1])]
+    nothing = np.zeros((len(windings), len(names)), dtype=np.bool_)
+    for i in range(windings.shape[1]):
+        columns = [place for place, name in enumerate(names) if name.startswith(f"pendulums.{i}.angle.")]
+        nothing[np.ix_(windings[:, i] != 0, columns)] = True
+    return nothing
+
+
 def means(pendulums: int) -> tuple[int, ...]:
     """Indices into ``result_infos`` of the results that are means."""
     names = [info.name for info in result_infos(pendulums)]
@@ -130,4 +163,4 @@ def settled_infos(pendulums: int) -> tuple[ResultInfo, ...]:
         )
         for place in means(pendulums)
     ]
-    return (*infos, *_OWN, *widths)
+    return (*infos, *_OWN, *_windings(pendulums), *widths)

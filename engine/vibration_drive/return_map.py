@@ -21,7 +21,7 @@ from sprag_study.engine.vibration_drive.kernel import Kernel
 from sprag_study.engine.vibration_drive.layout import OUT_ENDING
 from sprag_study.engine.vibration_drive.pieces import Pieces
 from sprag_study.engine.vibration_drive.simulate import CLUTCH_NAMES
-from sprag_study.engine.vibration_drive.strobes import BEGIN, FRACTION, TURN
+from sprag_study.engine.vibration_drive.strobes import ANGLE, BEGIN, FRACTION, PENDULUM_WIDTH, SHAFT_WIDTH, TURN
 
 Floats = NDArray[np.float64]
 #: The parameters of cases (as for ``simulate``) for values of the branch's parameter, shape (cases,).
@@ -33,6 +33,7 @@ _CLOSE = 0.02
 _GRID = 1.0 / 1024.0
 _OK = ENDINGS.index(Ending.OK)
 _TRANSMITS = int(Clutch.ENGAGED)
+_TURN = 2.0 * math.pi
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +54,8 @@ class DriveMap:
         A strobe whose part of the period and whose states of clutches and shaft are those of all points.
     units : array, shape (columns,)
         What counts as 1 in each column of a strobe.
+    windings : array, shape (pendulums,)
+        Whole turns that each pendulum makes in those periods; images are without them.
     """
 
     kernel: Kernel
@@ -62,6 +65,7 @@ class DriveMap:
     order: int
     like: Floats
     units: Floats
+    windings: NDArray[np.int64]
 
     def point(self, state: Floats) -> Floats:
         """Coordinates of a strobe, shape (n,); NaN where its states are others than the section's."""
@@ -85,6 +89,7 @@ class DriveMap:
     def images(self, points: Floats, parameters: Floats) -> Floats:
         """Images of points, shape (m, n); NaN where the states of clutches or shaft are others, or a run fails."""
         ends = self._run(self._strobes(points), parameters, self.order)[:, self.order - 1]
+        ends[:, SHAFT_WIDTH + ANGLE :: PENDULUM_WIDTH] -= _TURN * self.windings
         return self._points(np.ascontiguousarray(ends))
 
     def _run(self, rows: Floats, parameters: Floats, periods: int, extra: float = 0.0) -> Floats:
@@ -98,11 +103,15 @@ class DriveMap:
         return strobes
 
     def half(self, point: Floats, parameter: float) -> float:
-        """Distance between a point and its image after half of the order's periods; infinite for an odd order."""
-        if self.order % 2:
+        """Distance between a point and its image after half of the order's periods; infinite for an odd order, and
+        where a pendulum makes an odd number of turns.
+        """
+        if self.order % 2 or np.any(self.windings % 2):
             return math.inf
         row = self.state(point)
-        end = self.point(self._run(row[None], np.array([parameter]), self.order // 2)[0, -1])
+        image = self._run(row[None], np.array([parameter]), self.order // 2)[0, -1]
+        image[SHAFT_WIDTH + ANGLE :: PENDULUM_WIDTH] -= _TURN * (self.windings // 2)
+        end = self.point(image)
         return math.inf if np.any(np.isnan(end)) else float(np.max(np.abs(end - point)))
 
     def _turn(self, row: Floats, parameter: float) -> Pieces | None:

@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 
 from sprag_study.engine.endings import ENDINGS, Ending
 from sprag_study.engine.run import SettledRun
-from sprag_study.engine.vibration_drive.cases import Column, PendulumColumn, pendulum_column, with_lengths
+from sprag_study.engine.vibration_drive.cases import Column, turns_freely, with_lengths
 from sprag_study.engine.vibration_drive.integration import integrate
 from sprag_study.engine.vibration_drive.kernel import Kernel
+from sprag_study.engine.vibration_drive.orbits import without_turns
 from sprag_study.engine.vibration_drive.regimes import Regime, means, settled_infos
 from sprag_study.engine.vibration_drive.results import result_infos
 from sprag_study.engine.vibration_drive.settle import SettledBatch
@@ -51,13 +52,11 @@ class Motions:
         self.repeats: Flags = self.ok & settled.repeats
         self.kinds = settled.regimes.astype(np.int64)
         self.orders = settled.orders
-        self.strobes = _orbits(module, matrix, settings, settled.points, self.orders)
+        self.strobes = _orbits(module, matrix, settings, settled)
         self.nu = matrix[:, Column.NU]
         self.means, self.half_widths = _means(settled.values, n)
         # Without a spring a pendulum that has turned over is where it was.
-        coefficients = module.LAYOUT.coefficients
-        springs = [matrix[:, pendulum_column(coefficients, i, PendulumColumn.SPRING)] for i in range(n)]
-        self.turns_over = np.column_stack(springs) == 0.0
+        self.turns_over = turns_freely(matrix, n)
 
     def regimes(self, lanes: Ints) -> list[Ints]:
         """The regimes of one case, by falling share: the starts that come to each, first one that is settled on it."""
@@ -147,8 +146,9 @@ def _unit(strobes: Floats, nu: float) -> Floats:
     return unit
 
 
-def _orbits(module: Kernel, matrix: Floats, settings: SettledRun, points: Floats, orders: Ints) -> Floats:
-    """The strobes at the ends of the periods of each orbit; NaN after its order.
+def _orbits(module: Kernel, matrix: Floats, settings: SettledRun, settled: SettledBatch) -> Floats:
+    """The strobes at the ends of the periods of each orbit; NaN after its order. Angles of pendulums that turn over are
+    without whole turns.
 
     Returns
     -------
@@ -156,6 +156,7 @@ def _orbits(module: Kernel, matrix: Floats, settings: SettledRun, points: Floats
         Speed of the shaft, angle and speed of each pendulum. States and windups are left out: where an event falls on
         a strobe, rounding decides them.
     """
+    points, orders = settled.points, settled.orders
     columns = [SHAFT_SPEED]
     for i in range(module.LAYOUT.n):
         base = SHAFT_WIDTH + PENDULUM_WIDTH * i
@@ -169,7 +170,8 @@ def _orbits(module: Kernel, matrix: Floats, settings: SettledRun, points: Floats
         begun[:, FRACTION] = 1.0
         lengths = orders[rows] - begun[:, BEGIN]
         turned = with_lengths(matrix[rows], begun[:, BEGIN], lengths, windowed=False)
-        done = integrate(module, turned, settings.run, starts=begun, strobes=longest).strobes[:, :, columns]
+        done = integrate(module, turned, settings.run, starts=begun, strobes=longest).strobes
+        without_turns(done, settled.windings[rows] != 0)
         inside = np.arange(longest) < orders[rows, None]
-        strobes[rows] = np.where(inside[:, :, None], done, np.nan)
+        strobes[rows] = np.where(inside[:, :, None], done[:, :, columns], np.nan)
     return strobes

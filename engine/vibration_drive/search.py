@@ -13,11 +13,12 @@ from sprag_study.engine.endings import ENDINGS, Ending
 from sprag_study.engine.run import Run, SettledRun
 from sprag_study.engine.vibration_drive import newton, orbits
 from sprag_study.engine.vibration_drive.automaton import Clutch, Shaft
-from sprag_study.engine.vibration_drive.cases import Column, swings, with_lengths
+from sprag_study.engine.vibration_drive.cases import Column, swings, turns_freely, with_lengths
 from sprag_study.engine.vibration_drive.characteristics import of_orbits, tied_clutches
 from sprag_study.engine.vibration_drive.integration import Integration, integrate
 from sprag_study.engine.vibration_drive.kernel import Kernel
 from sprag_study.engine.vibration_drive.layout import OUT_ENDING, OUT_EVENTS, OUT_STEPS
+from sprag_study.engine.vibration_drive.regimes import angles_without_meaning
 from sprag_study.engine.vibration_drive.strobes import (
     BEGIN,
     CLUTCH,
@@ -84,11 +85,15 @@ _FREE, _HELD = float(Clutch.FREE), float(Shaft.HELD)
 
 @dataclass(slots=True)
 class Orbits:
-    """Certified orbits, one per row: case numbers, points at the strobe, orders, and the report of Newton's method."""
+    """Certified orbits, one per row: case numbers, points at the strobe, orders, whole turns of each pendulum in that
+    many periods, and the report of Newton's method.
+    """
 
     cases: Ints
     points: Floats
     orders: Ints
+    #: Shape (orbits, pendulums).
+    windings: Ints
     multipliers: Floats
     residuals: Floats
     #: The least period in the orbit's own strobes.
@@ -99,8 +104,8 @@ class Orbits:
     def take(self, rows: Ints | Flags) -> "Orbits":
         """Some of them."""
         return Orbits(
-            self.cases[rows], self.points[rows], self.orders[rows], self.multipliers[rows], self.residuals[rows],
-            self.least[rows], self.units[rows],
+            self.cases[rows], self.points[rows], self.orders[rows], self.windings[rows], self.multipliers[rows],
+            self.residuals[rows], self.least[rows], self.units[rows],
         )  # fmt: skip
 
 
@@ -130,8 +135,11 @@ class Search:
     steps: Floats = field(init=False)
     events: Floats = field(init=False)
     endings: NDArray[np.int8] = field(init=False)
-    #: Periods before which no orbit is looked for again.
-    wait: Floats = field(init=False)
+    #: Periods before which no orbit is looked for again, shape (2, cases): one along which no pendulum turns over, and
+    #: one along which some pendulum does.
+    waits: Floats = field(init=False)
+    #: Pendulums that no spring holds, shape (cases, pendulums): their angles matter only up to whole turns.
+    free: Flags = field(init=False)
     #: Total periods computed for each case, including disturbed runs.
     spent: Floats = field(init=False)
     #: Steps that a search may take.
@@ -148,7 +156,9 @@ class Search:
         self.history = np.zeros((cases, max(self._looked_at, LONG), width(n)))
         self.periods = np.zeros(cases, dtype=np.int64)
         self.turns = np.zeros((cases, self.settings.at_most))
-        self.steps, self.events, self.wait, self.spent = (np.zeros(cases) for _ in range(4))
+        self.steps, self.events, self.spent = (np.zeros(cases) for _ in range(3))
+        self.waits = np.zeros((2, cases))
+        self.free = turns_freely(self.matrix, n)
         self.endings = np.full(cases, _OK, dtype=np.int8)
 
     @property
@@ -179,8 +189,10 @@ class Search:
         np.subtract.at(left, cases, steps)
         np.maximum(left, 0.0, out=left)
 
-    def units(self, active: Ints) -> Floats:
-        """Scales of the strobes' columns."""
+    def units(self, active: Ints, *, rotating: bool = False) -> Floats:
+        """Scales of the strobes' columns; with ``rotating`` angles of pendulums without a spring count without whole
+        turns.
+        """
         units = np.empty((len(active), self.history.shape[2]))
         orbits.find_units(
             self.history,
@@ -189,6 +201,7 @@ class Search:
             self.settings.max_period,
             self.matrix[active, Column.NU],
             self.steady_shaft,
+            self.free[active] & rotating,
             units,
         )
         return units
@@ -223,70 +236,102 @@ class Search:
 
     def look(self, active: Ints) -> Orbits:
         """Orbits that cases approach, among the cases that seem to approach one."""
-        active = active[self.periods[active] >= self.wait[active]]
-        units = self.units(active)
-        found = np.zeros(len(active), dtype=np.int64)
+        # First those along which pendulums turn over: the more turns there are in the angles, the less they tell
+        # strobes apart unless they are left out.
+        rotating = self._look(active[np.any(self.free[active], axis=1)], rotating=True)
+        others = active[~np.isin(active, rotating.cases)]
+        return joined([rotating, self._look(others, rotating=False)], self)
+
+    def _look(self, active: Ints, *, rotating: bool) -> Orbits:
+        """Orbits that cases approach, with or without a pendulum that turns over."""
+        active = active[self.periods[active] >= self.waits[int(rotating), active]]
+        if not len(active):
+            return joined([], self)
+        units = self.units(active, rotating=rotating)
+        found, free = np.zeros(len(active), dtype=np.int64), self.free[active] & rotating
+        windings = np.zeros(free.shape, dtype=np.int64)
         orbits.find_candidates(
-            self.history, active, self.count, units, NEAR, SHARED, WINDOW, self.settings.max_period, found
-        )
+            self.history, active, self.count, units, NEAR, SHARED, WINDOW, self.settings.max_period, free, windings,
+            found,
+        )  # fmt: skip
         rows = np.flatnonzero(found)
         # The longest runs first, because the last ones leave lanes idle.
         rows = rows[np.argsort(-found[rows], kind="stable")]
-        certified = self.certify(active[rows], self.starts[active[rows]], found[rows], units[rows])
-        return self.of_least_order(certified)
+        points = self.starts[active[rows]]
+        orbits.without_turns(points[:, None], free[rows])
+        return self.of_least_order(self.certify(active[rows], points, found[rows], units[rows], windings[rows]))
 
-    def certify(self, cases: Ints, points: Floats, orders: Ints, units: Floats, *, slaved: bool = False) -> Orbits:
+    def rotates(self, cases: Ints, windings: Ints) -> Flags:
+        """Pendulums whose angles matter only up to whole turns on orbits with these windings, shape (orbits,
+        pendulums): all without a spring where one of them turns over, otherwise none.
+        """
+        rotates: Flags = self.free[cases] & np.any(windings != 0, axis=1)[:, None]
+        return rotates
+
+    def certify(
+        self, cases: Ints, points: Floats, orders: Ints, units: Floats, windings: Ints | None = None, *,
+        slaved: bool = False,
+    ) -> Orbits:  # fmt: skip
         """Newton's method from points near orbits of those orders; the stable ones that the runs are near.
 
-        With ``slaved`` the points are those to which the speeds of slow shafts were moved (`slow.march`): these must
-        be within ``AWAY``, and multipliers may be closer to 1.
+        With ``windings`` (shape (orbits, pendulums)) the pendulums make so many whole turns along the orbits. With
+        ``slaved`` the points are those to which the speeds of slow shafts were moved (`slow.march`): these must be
+        within ``AWAY``, and multipliers may be closer to 1.
         """
         begun = points
+        if windings is None:
+            windings = np.zeros((len(cases), self.kernel.LAYOUT.n), dtype=np.int64)
         run, stable = (self.settings.fine, STABLE_SLOWLY) if slaved else (self.run, STABLE)
         certified: list[Orbits] = []
         for number in range(_STEPS):
             if not len(cases):
                 break
-            moved, told, turns = self._step(cases, points, orders, units, run)
+            moved, told, turns = self._step(cases, points, orders, units, windings, run)
             away = np.empty(len(cases))
-            orbits.distances(moved, begun, units, away)
+            orbits.distances(moved, begun, units, np.zeros(windings.shape, dtype=np.bool_), away)
             residual, size, multiplier = told[:, newton.RESIDUAL], told[:, newton.STEP], told[:, newton.MULTIPLIER]
             close = away < np.where(slaved | (self.periods[cases] < SLOWLY_FROM), AWAY, SLOWLY_AWAY)
             converged = (residual < RESIDUAL) & ((size < RESIDUAL) | (number >= _ENOUGH_STEPS))
             accepted = converged & (multiplier < stable) & close
             slow = np.flatnonzero(accepted & (away >= AWAY))
             if len(slow):
-                accepted[slow] = self._approaches(cases[slow], turns[slow], orders[slow], units[slow], multiplier[slow])
+                accepted[slow] = self._approaches(
+                    cases[slow], turns[slow], orders[slow], units[slow], windings[slow], multiplier[slow]
+                )
             if np.any(accepted):
                 least = np.empty(len(cases), dtype=np.int64)
-                orbits.find_least(points, turns, orders, units, _SAME, least)
+                orbits.find_least(points, turns, orders, windings, units, _SAME, least)
                 # The last step brings the orbit closer still, unless it is mere rounding.
                 better = np.where((size < RESIDUAL)[:, None], moved, points)
-                certified.append(Orbits(cases, better, orders, multiplier, residual, least, units).take(accepted))
+                every = Orbits(cases, better, orders, windings, multiplier, residual, least, units)
+                certified.append(every.take(accepted))
             fails = converged | (told[:, newton.AGREES] == 0.0) | ~(size < 1.0) | ~close
             fails |= (residual < _TELLING) & (multiplier >= stable)
-            self._failed(cases[fails & ~accepted])
+            self._failed(cases[fails & ~accepted], windings[fails & ~accepted])
             left = np.flatnonzero(~(fails | accepted))
-            cases, orders = cases[left], orders[left]
+            cases, orders, windings = cases[left], orders[left], windings[left]
             points, begun, units = moved[left], begun[left], units[left]
-        self._failed(cases)
+        self._failed(cases, windings)
         return joined(certified, self)
 
-    def _approaches(self, cases: Ints, turns: Floats, orders: Ints, units: Floats, multipliers: Floats) -> Flags:
+    def _approaches(
+        self, cases: Ints, turns: Floats, orders: Ints, units: Floats, windings: Ints, multipliers: Floats
+    ) -> Flags:
         """Whether the strobes of cases come nearer to orbits, given by the strobes of a turn from their points on."""
         found = np.zeros(len(cases), dtype=np.bool_)
-        orbits.find_approaching(self.history, cases, self.count, turns, orders, units, multipliers, found)
+        free = self.rotates(cases, windings)
+        orbits.find_approaching(self.history, cases, self.count, turns, orders, units, multipliers, free, found)
         return found
 
     def _step(
-        self, cases: Ints, points: Floats, orders: Ints, units: Floats, run: Run
+        self, cases: Ints, points: Floats, orders: Ints, units: Floats, windings: Ints, run: Run
     ) -> tuple[Floats, Floats, Floats]:
         """A step of Newton's method: the points after it, its report, and the strobes of the turn before it."""
         disturbed, first, done = self._disturbed_runs(cases, points, orders, units, run)
         ends = np.ascontiguousarray(done.strobes[np.arange(len(disturbed)), orders[disturbed] - 1])
         tied = self._tied(cases, points, orders, done.sums[first[:-1]])
         moved, told = np.empty_like(points), np.empty((len(cases), 4))
-        newton.step(points, ends, first, units, DISTURBANCE, self.steady_shaft, tied, moved, told)
+        newton.step(points, ends, first, units, DISTURBANCE, self.steady_shaft, tied, windings, moved, told)
         return moved, told, done.strobes[first[:-1]]
 
     def refined(self, found: Orbits, *, slaved: bool = False) -> Orbits:
@@ -297,7 +342,9 @@ class Search:
             if not len(rows):
                 break
             some = found.take(rows)
-            moved, told, _ = self._step(some.cases, some.points, some.orders, some.units, self.settings.fine)
+            moved, told, _ = self._step(
+                some.cases, some.points, some.orders, some.units, some.windings, self.settings.fine
+            )
             good = (told[:, newton.RESIDUAL] < RESIDUAL) & (told[:, newton.MULTIPLIER] < stable)
             rows, moved, told = rows[good], moved[good], told[good]
             found.points[rows] = moved
@@ -336,18 +383,22 @@ class Search:
         return tied
 
     def over_one_turn(self, found: Orbits) -> Floats:
-        """Characteristics of orbits over one turn of each, shape (orbits, results)."""
+        """Characteristics of orbits over one turn of each, shape (orbits, results); the angles of a pendulum that turns
+        over have no mean, no extremes and no amplitude.
+        """
         cases = found.cases
         matrix = with_lengths(self.whole(cases), found.points[:, BEGIN], found.orders.astype(float), windowed=True)
         sums = integrate(self.kernel, matrix, self.settings.fine, starts=found.points).sums
         self.spent[cases] += found.orders
         self.steps[cases] += sums[:, OUT_STEPS]
         self.events[cases] += sums[:, OUT_EVENTS]
-        return of_orbits(self.kernel.LAYOUT, matrix, sums)
+        values = of_orbits(self.kernel.LAYOUT, matrix, sums)
+        values[angles_without_meaning(found.windings)] = np.nan
+        return values
 
-    def _failed(self, cases: Ints) -> None:
-        """Let cases continue before the next search."""
-        self.wait[cases] = _BACK * self.periods[cases]
+    def _failed(self, cases: Ints, windings: Ints) -> None:
+        """Let cases continue before the next search for such an orbit."""
+        self.waits[np.any(windings != 0, axis=1).astype(np.int64), cases] = _BACK * self.periods[cases]
 
     def move_strobes(self, active: Ints) -> None:
         """Move the strobes within the period, in case an event coincides with them."""
@@ -360,7 +411,9 @@ class Search:
         if not len(again):
             return found
         cases = found.cases[again]
-        better = self.certify(cases, found.points[again], found.least[again], found.units[again], slaved=slaved)
+        least = found.least[again]
+        windings = found.windings[again] * least[:, None] // found.orders[again, None]
+        better = self.certify(cases, found.points[again], least, found.units[again], windings, slaved=slaved)
         kept = ~np.isin(found.cases, better.cases)
         return joined([found.take(kept), better], self)
 
@@ -369,7 +422,8 @@ def joined(parts: list[Orbits], search: Search) -> Orbits:
     """The orbits of several searches."""
     if not parts:
         none, numbers, rows = np.empty(0), np.empty(0, dtype=np.int64), np.empty((0, search.history.shape[2]))
-        return Orbits(numbers, rows, numbers, none, none, numbers, rows)
+        windings = np.empty((0, search.kernel.LAYOUT.n), dtype=np.int64)
+        return Orbits(numbers, rows, numbers, windings, none, none, numbers, rows)
     return Orbits(*(np.concatenate([getattr(part, name) for part in parts]) for name in Orbits.__slots__))
 
 

@@ -1,5 +1,6 @@
 """Strobes of settled motions at one phase of the excitation: points of bifurcation diagrams and Poincare sections."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -8,18 +9,21 @@ from numpy.typing import ArrayLike, NDArray
 
 from sprag_study.engine.endings import ENDINGS, Ending
 from sprag_study.engine.run import SettledRun
-from sprag_study.engine.vibration_drive.cases import case_matrix, with_lengths
+from sprag_study.engine.vibration_drive.cases import case_matrix, turns_freely, with_lengths
 from sprag_study.engine.vibration_drive.integration import integrate
 from sprag_study.engine.vibration_drive.kernel import kernel_of
 from sprag_study.engine.vibration_drive.layout import OUT_ENDING
+from sprag_study.engine.vibration_drive.orbits import without_turns
 from sprag_study.engine.vibration_drive.settle import settle
-from sprag_study.engine.vibration_drive.strobes import BEGIN, FRACTION, in_order
+from sprag_study.engine.vibration_drive.strobes import ANGLE, BEGIN, FRACTION, PENDULUM_WIDTH, SHAFT_WIDTH, in_order
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 #: Phases are rounded to a multiple of this part of the period, which is exact in binary.
 GRID = 1.0 / 4096.0
 _OK = ENDINGS.index(Ending.OK)
+_TURN = 2.0 * math.pi
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +37,8 @@ class Sections:
     orders : int array, shape (cases,)
         Excitation periods in one turn of the orbit; 0 where there is none.
     strobes : array, shape (cases, count, strobes.width(n))
-        Of a periodic motion those of one turn, if there are as many, then NaN; NaN where a case did not end ok.
+        Of a periodic motion those of one turn, if there are as many, then NaN; NaN where a case did not end ok. Angles
+        of a pendulum without a spring that turns over are between -pi and pi.
     """
 
     regimes: NDArray[np.int8]
@@ -74,7 +79,15 @@ def sections(
         strobes[kept] = _strobes(columns, settings, found.points, kept, phase, count)
     for case in np.flatnonzero((orders > 0) & (orders < count)).tolist():
         strobes[case, orders[case] :] = np.nan
+    _leave_out_turns(case_matrix(columns, settings.run, cases), found.windings, strobes)
     return Sections(found.regimes, orders, strobes)
+
+
+def _leave_out_turns(matrix: Floats, windings: Ints, strobes: Floats) -> None:
+    """Take whole turns from the angles of the pendulums without a spring that turn over, in place."""
+    angles = strobes[:, :, SHAFT_WIDTH + ANGLE :: PENDULUM_WIDTH]
+    apart = np.fmax.reduce(angles, axis=1) - np.fmin.reduce(angles, axis=1)
+    without_turns(strobes, turns_freely(matrix, windings.shape[1]) & ((windings != 0) | (apart > _TURN)))
 
 
 def _strobes(

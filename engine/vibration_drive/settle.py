@@ -15,7 +15,7 @@ from sprag_study.engine.vibration_drive.kernel import Kernel, kernel_of
 from sprag_study.engine.vibration_drive.lanes import RUNUP_SHARE
 from sprag_study.engine.vibration_drive.no_load import limit_of
 from sprag_study.engine.vibration_drive.orbits import distances, settling_periods
-from sprag_study.engine.vibration_drive.regimes import Regime, means, settled_infos
+from sprag_study.engine.vibration_drive.regimes import Regime, means, settled_infos, winding
 from sprag_study.engine.vibration_drive.results import STEADY_SHAFT, result_infos
 from sprag_study.engine.vibration_drive.search import LONG, ROUND, RUNS, Orbits, Search, joined, transient_rounds
 from sprag_study.engine.vibration_drive.slow import march
@@ -86,6 +86,17 @@ class SettledBatch:
         names = [info.name for info in settled_infos((self.points.shape[1] - SHAFT_WIDTH) // PENDULUM_WIDTH)]
         orders: Ints = np.nan_to_num(self.values[:, names.index("regime.order")]).astype(np.int64)
         return orders
+
+    @property
+    def windings(self) -> Ints:
+        """Whole turns of each pendulum in one turn of the orbit of each case, shape (cases, pendulums); 0 without an
+        orbit.
+        """
+        pendulums = (self.points.shape[1] - SHAFT_WIDTH) // PENDULUM_WIDTH
+        names = [info.name for info in settled_infos(pendulums)]
+        columns = [names.index(winding(i)) for i in range(pendulums)]
+        turns: Ints = np.nan_to_num(self.values[:, columns]).astype(np.int64)
+        return turns
 
 
 class _Results:
@@ -269,6 +280,8 @@ def _write(search: Search, found: Orbits, results: _Results, *, slaved: bool = F
     results.values[cases] = np.nan
     results.values[cases, : results.plain] = search.over_one_turn(found)
     results.put(cases, "regime.order", found.orders)
+    for i in range(search.kernel.LAYOUT.n):
+        results.put(cases, winding(i), found.windings[:, i])
     results.put(cases, "regime.multiplier", found.multipliers)
     results.put(cases, "regime.residual", found.residuals)
     results.put(cases, "regime.settled_after", _settled_after(search, found, slaved=slaved))
@@ -289,7 +302,8 @@ def _settled_after(search: Search, found: Orbits, *, slaved: bool) -> Floats:
     if slaved:
         apart = np.abs(search.starts[cases] - found.points)[:, SHAFT_SPEED] / found.units[:, SHAFT_SPEED]
     else:
-        distances(search.starts[cases], found.points, found.units, apart)
+        rotates = search.rotates(cases, found.windings)
+        distances(search.starts[cases], found.points, found.units, rotates, apart)
     settling_periods(apart, found.orders, found.multipliers, search.settings.settled, periods)
     return search.periods[cases] + periods
 

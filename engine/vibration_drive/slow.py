@@ -71,13 +71,14 @@ GOES, TRIES, LEAVES = range(3)
 def _order(strobes: Floats, unit: Floats, max_order: int) -> int:
     """Least order after which the last strobes of a run repeat, up to the slow change; 0: none."""
     last = strobes.shape[0] - 1
+    unwound = np.zeros((strobes.shape[1] - SHAFT_WIDTH) // PENDULUM_WIDTH, dtype=np.int64)
     for order in range(1, max_order + 1):
         length = max(order, WINDOW)
         if length + order > strobes.shape[0]:
             break
         apart = 0.0
         for j in range(length):
-            apart = max(apart, distance(strobes[last - j], strobes[last - j - order], unit))
+            apart = max(apart, distance(strobes[last - j], strobes[last - j - order], unit, unwound))
         if apart <= min(NEAR, SHARED / order):
             return order
     return 0
@@ -275,7 +276,8 @@ class _Marches:
         active, cases, bases, before, states = active[ran], cases[ran], bases[ran], before[ran], states[ran]
         strobes, nu = done.strobes[ran], search.matrix[cases, Column.NU]
         units = np.empty_like(bases)
-        find_units(strobes, np.arange(len(active)), _PERIODS, _PERIODS, nu, False, units)
+        unwound = np.zeros((len(active), search.kernel.LAYOUT.n), dtype=np.bool_)
+        find_units(strobes, np.arange(len(active)), _PERIODS, _PERIODS, nu, False, unwound, units)
         says = np.empty(len(active), dtype=np.int64)
         steer(strobes, units, search.settings.max_period, bases, before, states, says)
         tries = np.flatnonzero(says == TRIES)

@@ -14,6 +14,7 @@ from sprag_study.engine.vibration_drive.cases import Column, case_matrix, of_cas
 from sprag_study.engine.vibration_drive.integration import integrate
 from sprag_study.engine.vibration_drive.kernel import kernel_of
 from sprag_study.engine.vibration_drive.layout import OUT_ENDING
+from sprag_study.engine.vibration_drive.orbits import without_turns
 from sprag_study.engine.vibration_drive.regimes import Regime, settled_infos
 from sprag_study.engine.vibration_drive.settle import SettledBatch, settle
 from sprag_study.engine.vibration_drive.strobes import (
@@ -37,6 +38,12 @@ _OK = ENDINGS.index(Ending.OK)
 #: so many pairs to either side), as they are and in proportion to the steps, and at least this far (scaled); without
 #: any others around, the last number.
 _TIMES, _AROUND, _LEAST, _ALONE = 4.0, 3, 0.02, 0.2
+
+
+def _within_a_turn(apart: Floats) -> Floats:
+    """Differences of angles up to whole turns, without them."""
+    rest = np.remainder(apart, 2.0 * math.pi)
+    return np.asarray(np.minimum(rest, 2.0 * math.pi - rest))
 
 
 class Begun(IntEnum):
@@ -191,12 +198,13 @@ def _jumped(
     known = (begun == Begun.ON_ORBIT) | (begun == Begun.ARBITRARY)
     before = np.arange(len(starts))
     before[lines[:, 1:]] = lines[:, :-1]
-    same = (kind == kind[before]) & (order == order[before])
+    windings = batch.windings
+    same = (kind == kind[before]) & (order == order[before]) & np.all(windings == windings[before], axis=1)
     found[known & (batch.endings == _OK) & ~same] = True
     compared = np.flatnonzero(known & same & (order > 0))
     apart = np.full(len(starts), np.nan)
     if len(compared):
-        apart[compared] = _apart(columns, settings, batch.points, starts[compared], order, compared, before[compared])
+        apart[compared] = _apart(columns, settings, batch, starts[compared], compared, before[compared])
     for line in lines:
         for place, case in enumerate(line.tolist()):
             if not math.isnan(apart[case]):
@@ -216,21 +224,22 @@ def _usual(apart: Floats, steps: Floats, case: int, near: Ints) -> float:
 def _apart(
     columns: Mapping[str, ArrayLike],
     settings: SettledRun,
-    points: Floats,
+    batch: SettledBatch,
     starts: Floats,
-    order: Ints,
     cases: Ints,
     before: Ints,
 ) -> Floats:
     """Largest scaled difference between the ``starts`` of some cases, on the orbits of those ``before``, and their own
-    orbits at the nearest phase.
+    orbits at the nearest phase. Pendulums that turn over have made the same whole turns on both.
     """
+    points, order, turns_over = batch.points, batch.orders, batch.windings != 0
     own = np.union1d(cases, before)
     begin = points[own, BEGIN]
     matrix = case_matrix(of_cases(columns, own), settings.run, len(own))
     matrix = with_lengths(matrix, begin, order[own] - begin + (begin > 0.0), windowed=False)
     module, most = kernel_of(columns, settings.tolerance), int(order[own].max()) + 1
     orbits = integrate(module, matrix, settings.run, starts=continued(points[own]), strobes=most).strobes
+    without_turns(orbits, turns_over[own])
     angles = np.arange(SHAFT_WIDTH + ANGLE, points.shape[1], PENDULUM_WIDTH)
     speeds = np.append(angles + SPEED - ANGLE, SHAFT_SPEED)
     # Strobes after a turn are NaN.
@@ -239,5 +248,6 @@ def _apart(
     here, there = np.searchsorted(own, cases), np.searchsorted(own, before)
     scale = np.maximum(top[here], top[there])[:, None]
     off = np.abs(orbits[here] - starts[:, None, :])
+    off[:, :, angles] = np.where(turns_over[cases, None, :], _within_a_turn(off[:, :, angles]), off[:, :, angles])
     far = np.maximum(off[:, :, speeds].max(axis=2), off[:, :, angles].max(axis=2) * matrix[here, None, Column.NU])
     return np.asarray(np.nanmin(far / scale, axis=1))

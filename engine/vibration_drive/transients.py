@@ -3,6 +3,7 @@
 Every decision about a case follows from that case alone, so its flag does not depend on the batch.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -151,7 +152,11 @@ class _Settled:
         search = self._search
         found = search.look(active)
         if len(found.cases):
-            self.seen[found.cases] = search.over_one_turn(found)[:, self.columns]
+            seen = search.over_one_turn(found)[:, self.columns]
+            # A pendulum that turns over has no amplitude; a window without a whole turn does not show that it does.
+            turns_over = np.isnan(seen[:, 1:])
+            seen[:, 1:][turns_over] = np.maximum(self.seen[found.cases, 1:], math.pi)[turns_over]
+            self.seen[found.cases] = seen
         active = active[~np.isin(active, found.cases)]
         if not len(active):
             return active

@@ -94,20 +94,20 @@ def test_strobes_of_other_states_are_not_the_same(column: int, state: float) -> 
     one, other, apart = _strobe(), _strobe(), np.empty(1)
     units = np.ones_like(one)
     other[0, TURN] = 5.0  # the shaft's angle does not belong to its state
-    orbits.distances(one, other, units, apart)
+    orbits.distances(one, other, units, np.zeros((1, 1), dtype=np.bool_), apart)
     assert apart[0] == 0.0
     other[0, column] = state
-    orbits.distances(one, other, units, apart)
+    orbits.distances(one, other, units, np.zeros((1, 1), dtype=np.bool_), apart)
     assert apart[0] == math.inf
     # A derivative across a change of states tells nothing: no disturbed run may end in others.
     starts, first = np.empty((5, one.shape[1])), np.zeros(2, dtype=np.int64)
     assert newton.disturb(one, units, 1e-7, False, starts, first) == 5
     ends, moved, told = one + 0.5 * (starts - one), np.empty_like(one), np.empty((1, 4))
     tied = np.zeros((1, 1), dtype=np.bool_)
-    newton.step(one, ends, first, units, 1e-7, False, tied, moved, told)
+    newton.step(one, ends, first, units, 1e-7, False, tied, ONE[None], moved, told)
     assert told[0].tolist() == pytest.approx([0.0, 0.0, 0.5, 1.0])
     ends[3, column] = state
-    newton.step(one, ends, first, units, 1e-7, False, tied, moved, told)
+    newton.step(one, ends, first, units, 1e-7, False, tied, ONE[None], moved, told)
     assert told[0].tolist() == [math.inf, math.inf, math.inf, 0.0]
 
 

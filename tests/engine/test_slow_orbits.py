@@ -111,7 +111,8 @@ def test_the_candidate_is_the_order_after_which_strobes_repeat(shift: float, shr
     k = np.arange(97)
     speeds = 1.0 + shift * (-1.0) ** k + 1e-3 * shrink**k / max(1.0, shrink**96)
     found, one = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
-    orbits.find_candidates(_strobes(speeds), one, 97, np.ones((1, width(1))), 0.01, 0.05, 6, 32, found)
+    free, windings = np.zeros((1, 1), dtype=np.bool_), np.zeros((1, 1), dtype=np.int64)
+    orbits.find_candidates(_strobes(speeds), one, 97, np.ones((1, width(1))), 0.01, 0.05, 6, 32, free, windings, found)
     assert found[0] == order
 
 
@@ -125,8 +126,9 @@ def test_a_run_approaches_an_orbit_at_half_the_rate_of_its_multiplier_at_least(s
     found, one = np.zeros(1, dtype=np.bool_), np.zeros(1, dtype=np.int64)
     multiplier = 0.994**2
     orbits.find_approaching(
-        _strobes(speeds), one, 97, turn, np.array([2]), np.ones((1, width(1))), np.array([multiplier]), found
-    )
+        _strobes(speeds), one, 97, turn, np.array([2]), np.ones((1, width(1))), np.array([multiplier]),
+        np.zeros((1, 1), dtype=np.bool_), found,
+    )  # fmt: skip
     assert found[0] == approaches
     assert math.sqrt(multiplier) == pytest.approx(0.994)
 
