@@ -89,7 +89,7 @@ def winding(pendulum: int) -> str:
 def _windings(pendulums: int) -> tuple[ResultInfo, ...]:
     what = (
         "whole turns of the pendulum, counter-clockwise, in the regime.order excitation periods after which the motion "
-        "repeats itself; 0 where it swings"
+        "repeats itself; 0 where it swings, otherwise its angle has no mean, no extremes and no amplitude"
     )
     return tuple(ResultInfo(winding(i), "1", what, "count", generation=3) for i in range(pendulums))
 

@@ -171,13 +171,15 @@ def _of_lines(study: Study, cases: NDArray[np.int64]) -> RowBlock:
 def _show(block: RowBlock, starts: int) -> None:
     """One case as a table, without missing values; a column for each of its regimes."""
     from sprag_study.service.reading.reader import shown as said
-    from sprag_study.service.results.regimes import ORDER, coasting_sentence, motion_sentence
+    from sprag_study.service.results.regimes import ORDER, coasting_sentence, motion_sentence, rotation_sentences
     from sprag_study.worker.models import ENDING_SENTENCES, OK
 
     first, *others = block.rows()
     regime, order = (first.results[name] for name in ("regime", ORDER))
     settled = motion_sentence(str(regime), order if isinstance(order, int) else None) if first.ending == OK else None
     meaning = said(settled) if settled else _(ENDING_SENTENCES[first.ending])
+    if not others:
+        meaning = " ".join([meaning, *map(said, rotation_sentences(first.results))])
     if not others and (coasting := coasting_sentence(first.results)) is not None:
         meaning = f"{meaning} {said(coasting)}"
     if others:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
@@ -13,12 +14,15 @@ from sprag_study.sentences import Amount
 from sprag_study.service.reading.reader import Phrase, joined, plural, term
 from sprag_study.worker.arrays import Bools, Floats, Ints
 from sprag_study.worker.models import REGIME_SENTENCES, flags_of
+from sprag_study.worker.models.vocabulary import ordinal
 
 if TYPE_CHECKING:
     from sprag_study.worker.models import ResultInfo
 
 #: The result with the number of excitation periods after which a motion repeats.
 ORDER: Final = "regime.order"
+#: The result with the whole turns that a pendulum makes in so many periods.
+_WINDING: Final = re.compile(r"pendulums\.(\d+)\.winding")
 #: Regime of points that no line joins, because they do not show settled motion.
 UNSETTLED: Final = "unsettled"
 #: Regimes that a line may join: a drive without a load coasts, as the limit of a vanishing load.
@@ -60,6 +64,40 @@ def motion_sentence(regime: str, order: int | None) -> Phrase:
         "The motion repeats after {count} excitation periods, and disturbances of it die away.",
         order,
     )
+
+
+def rotation_sentences(results: Mapping[str, object]) -> tuple[Phrase, ...]:
+    """How often each pendulum turns over along an orbit; nothing of one that swings.
+
+    Parameters
+    ----------
+    results : mapping
+        Results of a case by name.
+    """
+    order, sentences = results.get(ORDER), list[Phrase]()
+    for name, turns in results.items():
+        whose = _WINDING.fullmatch(name)
+        if whose is None or not isinstance(turns, int) or not isinstance(order, int) or turns == 0:
+            continue
+        whole = plural("{count} whole turn", "{count} whole turns", abs(turns))
+        periods = plural("{count} excitation period", "{count} excitation periods", order)
+        number = ordinal(whose[1])
+        sentences.append(
+            Phrase(
+                "Pendulum {number} turns over counter-clockwise: {turns} in {periods}.",
+                number=number,
+                turns=whole,
+                periods=periods,
+            )
+            if turns > 0
+            else Phrase(
+                "Pendulum {number} turns over clockwise: {turns} in {periods}.",
+                number=number,
+                turns=whole,
+                periods=periods,
+            )
+        )
+    return tuple(sentences)
 
 
 def without_orbit(regime: str, model: str) -> tuple[Phrase, ...]:

@@ -37,7 +37,7 @@ from sprag_study.service.reading.reader import Phrase, joined, meanings
 from sprag_study.service.results.defaults import main_results
 from sprag_study.service.results.headlines.along import case_clause
 from sprag_study.service.results.headlines.headline import MOST, NOTHING, KeyNumber, amount, digits
-from sprag_study.service.results.regimes import ORDER, coasting_sentence, motion_sentence
+from sprag_study.service.results.regimes import ORDER, coasting_sentence, motion_sentence, rotation_sentences
 from sprag_study.service.results.selection import axis_name, own_paths
 from sprag_study.service.results.start_states import check_start
 from sprag_study.service.results.sweeps import direction_texts
@@ -281,6 +281,7 @@ def _said(study: Study, row: CaseRow) -> list[str]:
     regime, order = row.results.get("regime"), row.results.get(ORDER)
     if isinstance(regime, str) and regime not in row.flags:
         said.append(motion_sentence(regime, order if isinstance(order, int) else None))
+        said += rotation_sentences(row.results)
         said += [text for text in [coasting_sentence(row.results)] if text is not None]
     return [joined("", [text]) for text in said]
 

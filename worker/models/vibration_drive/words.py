@@ -86,6 +86,7 @@ CAPTIONS: Final[dict[str, str]] = {
     "pendulums.N.power.input": "Mean input power",
     "pendulums.N.power.loss": "Mean power lost in damping",
     "pendulums.N.power.clutch_loss": "Mean power lost in the clutch",
+    "pendulums.N.winding": "Winding number",
     "pendulums.N.angle": "Angle",
     "pendulums.N.speed": "Speed",
     "pendulums.N.torque": "Clutch torque",
