@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from sprag_study.engine.formulas.expressions import RESERVED, Expression, ExpressionError
 from sprag_study.engine.machine_shaft.columns import Columns
 from sprag_study.engine.machine_shaft.drive_train import Train
+from sprag_study.engine.machine_shaft.elements import MAX_ELEMENTS, LinkageChoice, element_faults
 from sprag_study.engine.machine_shaft.mechanisms import RodMechanism
 from sprag_study.engine.machine_shaft.motor import characteristic, free_speed
 from sprag_study.engine.machine_shaft.operations import SpeedLaw, formula_breaks
@@ -114,6 +115,8 @@ def _check_part(part: PartChoice) -> None:
     _check_form(_INERTIA, mechanism.kind, mechanism.table is not None, has_formula)
     if operation.quantity in {"torque", "force", "pressure"}:
         _check_form(Sentence("The operation"), operation.form, operation.table is not None, bool(operation.formula))
+    if mechanism.kind == "linkage":
+        _check_linkage(mechanism.linkage)
     needs = operation.quantity in {"force", "gas", "pressure"} or (
         operation.quantity == "torque" and operation.over == "stroke"
     )
@@ -122,6 +125,27 @@ def _check_part(part: PartChoice) -> None:
             Sentence(
                 "A force, a gas or a diagram over the stroke needs a mechanism with dimensions, such as a slider_crank."
             )
+        )
+    if needs and mechanism.linkage is not None and not mechanism.linkage.working:
+        raise StructureError(
+            Sentence(
+                "A force, a gas or a diagram over the stroke needs the working part of the linkage: `working` names "
+                "its joint."
+            )
+        )
+
+
+def _check_linkage(linkage: LinkageChoice | None) -> None:
+    if linkage is None:
+        raise StructureError(Sentence("A linkage needs its elements, but none are given."))
+    if len(linkage.elements) > MAX_ELEMENTS:
+        raise StructureError(Sentence("A linkage has at most {most} elements.", most=MAX_ELEMENTS))
+    fault = next(element_faults(linkage), None)
+    if fault is not None:
+        place = fault.field if fault.element is None else f"elements.{fault.element}.{fault.field}"
+        why = fault.message
+        raise StructureError(
+            Sentence("{place} of the linkage, {value}, {why}.", place=place, value=fault.value, why=why)
         )
 
 

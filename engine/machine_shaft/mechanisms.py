@@ -120,6 +120,11 @@ class Mechanism(ABC):
     def worst_angles(self, values: Values) -> Sequence[Floats]:
         """Angles of which one has the smallest margin."""
 
+    def prepared(self, values: Values) -> Mapping[str, Floats]:
+        """Further values that follow from those of the parameters alone, computed once for a block of cases."""
+        del values
+        return {}
+
     def breaks(self, values: Values) -> Sequence[Floats]:
         """Angles at which the inertia or the travel has a kink, of the parameters' shape."""
         del values

@@ -6,6 +6,7 @@ from dataclasses import replace
 from itertools import chain
 
 from sprag_study.engine.catalogue import IN_MM, IN_RPM, STANDARD_GRAVITY, Parameter
+from sprag_study.engine.machine_shaft.elements import ElementKind
 from sprag_study.engine.machine_shaft.spec import (
     MOVING,
     MachineSpec,
@@ -136,6 +137,10 @@ MECHANISM_PARAMETERS: Mapping[MechanismKind, tuple[Parameter, ...]] = {
         _inertia("mechanism.quick_return.link_inertia", "J_l", "inertia of the slotted link about its pivot"),
         _mass("mechanism.quick_return.block_mass", "m_b", "mass of the sliding block on the crank pin"),
     ),
+    "linkage": (
+        _length("mechanism.linkage.crank", "r", "length of the crank"),
+        _angle("mechanism.linkage.inclination", "beta", "rise of the x axis above the level"),
+    ),
     "cam": (
         _length("mechanism.cam.lift", "h", "lift of the follower"),
         _cam_angle("mechanism.cam.start", "phi_0", "angle at which the rise begins", 0.0, False),
@@ -241,8 +246,53 @@ _CRANK_ANGLE = Parameter(
 )
 
 
+def _link(p: str, end: str, which: str, symbol: str) -> tuple[Parameter, ...]:
+    return (
+        _way(f"{p}.{end}_centre", f"s_{symbol}", f"{which} outer joint to the centre of mass, along the {which} link"),
+        _way(f"{p}.{end}_across", f"n_{symbol}", f"centre of mass of the {which} link to the left of its line"),
+        _mass(f"{p}.{end}_mass", f"m_{symbol}", f"mass of the {which} link"),
+        _inertia(f"{p}.{end}_inertia", f"J_{symbol}", f"inertia of the {which} link about its centre of mass"),
+    )
+
+
+def _guide(p: str, suffix: str = "") -> tuple[Parameter, ...]:
+    which = "second guide" if suffix else "guide"
+    return (
+        _angle(f"{p}.angle{suffix}", f"gamma{suffix}", f"direction of the {which} from that of its link"),
+        _way(f"{p}.offset{suffix}", f"e{suffix}", f"line of the {which} to the left of its joint"),
+    )
+
+
+def _element(index: int, kind: ElementKind) -> tuple[Parameter, ...]:
+    """Parameters of an element of a linkage."""
+    p = f"mechanism.linkage.elements.{index}"
+    first = (_length(f"{p}.first", "l_1", "length of the first link"), *_link(p, "first", "first", "1"))
+    bar = _link(p, "second", "second", "2")
+    block = _mass(f"{p}.block_mass", "m_b", "mass of the block on the joint")
+    sliding = (
+        _mass(f"{p}.mass", "m", "mass of what slides on the guide, or of a point"),
+        _inertia(f"{p}.inertia", "J", "inertia of what slides about its joint, where its guide turns"),
+    )
+    return {
+        "pivot": (_way(f"{p}.x", "x", "x of a fixed pivot"), _way(f"{p}.y", "y", "y of a fixed pivot")),
+        "point": (
+            _way(f"{p}.along", "s", "outer joint of its link to a point, along the link"),
+            _way(f"{p}.across", "n", "point to the left of the line of its link"), sliding[0],
+        ),
+        "RRR": (*first, _length(f"{p}.second", "l_2", "length of the second link"), *bar),
+        "RRP": (*first, *_guide(p), *sliding),
+        "RPR": (_way(f"{p}.offset", "e", "line of the guide to the left of its joint"), *bar, block),
+        "RPP": (*_guide(p), replace(_angle(f"{p}.slot_angle", "sigma", "direction of the slot from that of the guide"),
+                                    default=0.25 * _TURN), *sliding, block),
+        "PRP": (*_guide(p), *_guide(p, "_2"), block),
+    }[kind]  # fmt: skip
+
+
 def _mechanism(choice: MechanismChoice) -> tuple[Parameter, ...]:
     every = MECHANISM_PARAMETERS[choice.kind]
+    if choice.linkage is not None:
+        elements = (_element(index, each.kind) for index, each in enumerate(choice.linkage.elements))
+        return (*every, *chain.from_iterable(elements))
     if choice.kind == "four_bar" and choice.weights == "all":
         frame = "rise of the frame above the level, from the shaft to the rocker's pivot"
         every += (_angle("mechanism.four_bar.inclination", "beta", frame),)

@@ -17,11 +17,13 @@ from sprag_study.engine.machine_shaft.bearings import JointForces, joint_forces
 from sprag_study.engine.machine_shaft.cams import Cam
 from sprag_study.engine.machine_shaft.columns import Columns
 from sprag_study.engine.machine_shaft.four_bars import FourBar, ParallelCrank
+from sprag_study.engine.machine_shaft.joints import Reactions, reactions
 from sprag_study.engine.machine_shaft.linkages import CrankShaper, ScotchYoke, SliderCrank, Whitworth
 from sprag_study.engine.machine_shaft.linked_rams import DragLink, Toggle
 from sprag_study.engine.machine_shaft.mechanisms import Mechanism, Motion, RodMechanism, Values
 from sprag_study.engine.machine_shaft.operations import Operation, SpeedLaw, every_revolution, formula_breaks
 from sprag_study.engine.machine_shaft.pieces import Formula
+from sprag_study.engine.machine_shaft.planar import PlanarLinkage
 from sprag_study.engine.machine_shaft.problems import TableError, amount
 from sprag_study.engine.machine_shaft.spec import MechanismChoice, MechanismKind, PartChoice
 from sprag_study.engine.machine_shaft.strokes import Stroke
@@ -50,6 +52,8 @@ def mechanism_of(choice: MechanismChoice) -> Mechanism | None:
         return Whitworth() if choice.quick_return == "whitworth" else CrankShaper()
     if choice.kind == "cam":
         return Cam(choice.rise, choice.fall)
+    if choice.linkage is not None:
+        return PlanarLinkage(choice.linkage)
     plain = _PLAIN.get(choice.kind)
     return None if plain is None else plain()
 
@@ -141,6 +145,8 @@ class ShaftPart:
         self.values = columns.under(f"{prefix}mechanism.{choice.mechanism.kind}.")
         if choice.mechanism.bodies == "two_mass":
             self.values |= _two_masses(self.values)
+        if self.mechanism is not None:
+            self.values |= self.mechanism.prepared(self.values)
         self._curve = _inertia_curve(choice.mechanism, revolutions)
         names, text = ("phi", *self._constants), choice.mechanism.formula or ""
         self.inertia_formula = Expression(text, names) if choice.mechanism.kind == "formula" else None
@@ -282,6 +288,16 @@ class ShaftPart:
         rods = self._gravity if self.choice.mechanism.weights == "all" else 0.0 * self._gravity
         return joint_forces(self.values, own, squares, acceleration, push, self._gravity, rods)
 
+    def reactions(
+        self, phi: Floats, squares: Floats, acceleration: Floats, omega: Floats | None, factor: float
+    ) -> Reactions:
+        """Forces in the joints of a planar linkage; the parameters are those of ``joint_forces``."""
+        own, motion = self.own_angle(phi), self.motion(phi)
+        assert motion is not None
+        assert isinstance(self.mechanism, PlanarLinkage)
+        push = factor * self._operation.push(own, motion.way_slope, omega)
+        return reactions(self.mechanism, self.values, own, squares, acceleration, push, self._gravity)
+
     def _inertia(self, own: Floats, motion: Motion | None) -> tuple[Floats, Floats]:
         if motion is not None:
             return motion.inertia, motion.inertia_slope
@@ -294,7 +310,8 @@ class ShaftPart:
 
     def _carried(self, own_angle: Floats, motion: Motion | None) -> Floats:
         """Torque of the weights and of the spring on the working part."""
-        if self.choice.mechanism.weights == "all" and isinstance(self.mechanism, RodMechanism):
+        every = self.choice.mechanism.weights == "all" or self.choice.mechanism.kind == "linkage"
+        if every and isinstance(self.mechanism, RodMechanism):
             return np.asarray(-self._gravity * self.mechanism.lift(self.values, own_angle))
         if motion is None or self.mechanism is None or self.mechanism.ram_mass is None:
             return np.zeros(1)

@@ -4,16 +4,27 @@ Sizes that a mechanism does not have, such as those of its ram or the base circl
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sprag_study.engine import elementary
 from sprag_study.engine.machine_shaft.columns import Columns
+from sprag_study.engine.machine_shaft.elements import (
+    FRAME,
+    PIN,
+    SHAFT,
+    Element,
+    LinkageChoice,
+    fixed_joints,
+    link_pivots,
+)
 from sprag_study.engine.machine_shaft.four_bars import Links
 from sprag_study.engine.machine_shaft.machine import Machine
 from sprag_study.engine.machine_shaft.mechanisms import Mechanism
 from sprag_study.engine.machine_shaft.parts import ShaftPart
+from sprag_study.engine.machine_shaft.planar import PlanarLinkage
 from sprag_study.engine.machine_shaft.sketch import Bar, Plate, Sketch
 from sprag_study.engine.machine_shaft.sliders import Slider
 from sprag_study.engine.machine_shaft.spec import MachineSpec
@@ -186,6 +197,74 @@ def _shaft_alone(_: _Numbers, phi: Floats, __: Mechanism | None) -> Sketch:
     return sketch.turned(0.0)
 
 
+def _linkage(v: _Numbers, phi: Floats, mechanism: Mechanism) -> Sketch:
+    assert isinstance(mechanism, PlanarLinkage)
+    values = {name: np.full((1, 1, 1), value) for name, value in v.items()}
+    pose, fixed = mechanism.pose(values, phi[None, None, :]), fixed_joints(mechanism.choice)
+
+    def line(value: Floats) -> Floats:
+        return np.asarray(np.broadcast_to(value, (1, 1, len(phi)))[0, 0])
+
+    sketch = Sketch({name: _point(line(place.at.x), line(place.at.y), phi) for name, place in pose.joints.items()})
+    sketch.pivots = [name for name in pose.joints if name in fixed]
+    size = 0.07 * float(np.nan_to_num(np.ptp(np.concatenate(list(sketch.joints.values())), axis=0)).max())
+    sketch.turns = {
+        name: elementary.arctan2(line(link.direction.y), line(link.direction.x)) for name, link in pose.links.items()
+    }
+    sketch.bars.append(Bar((SHAFT, PIN), ("crank",)))
+    for index, each in enumerate(mechanism.choice.elements):
+        _draw_element(sketch, each, f"elements.{index}", size, mechanism.choice)
+    return sketch.turned(v["inclination"])
+
+
+def _draw_element(sketch: Sketch, each: Element, at: str, size: float, choice: LinkageChoice) -> None:
+    name, joints = each.name, each.joints
+    if each.kind == "point":
+        link = each.guides[0]
+        base = link_pivots(choice)[link]
+        if link != FRAME and base != name:
+            sketch.bars.append(Bar((base, name), (f"{at}.along",)))
+        return
+    if each.kind in {"RRR", "RRP"}:
+        sketch.bars.append(Bar((joints[0], name), (f"{at}.first",)))
+    if each.kind == "RRR":
+        sketch.bars.append(Bar((name, joints[1]), (f"{at}.second",)))
+    block = Plate(joints[0] if joints else "", _rectangle(1.4 * size, 0.8 * size), (f"{at}.block_mass",))
+    if each.kind == "RPR":
+        pin, bar = sketch.joints[joints[0]], sketch.joints[joints[1]]
+        away = np.sqrt(np.square(pin - bar).sum(axis=1))
+        reach = max(1.1 * float(np.nan_to_num(away).max()), size)
+        sketch.joints[f"{name}.end"] = bar + _circular(each.sign * reach, sketch.turns[f"{name}.second"])
+        sketch.bars.append(Bar((joints[1], f"{name}.end"), (f"{at}.offset",)))
+        sketch.plates.append(replace(block, turn=f"{name}.second"))
+    if each.kind in {"RRP", "RPP"}:
+        sliding = (f"{at}.mass", "inclination")
+        sketch.plates.append(Plate(name, _rectangle(2.2 * size, 1.4 * size), sliding, f"{name}.slider"))
+    if each.kind == "RPP":
+        sketch.bars.append(Bar((name, joints[0]), (f"{at}.slot_angle",)))
+        sketch.plates.append(block)
+    if each.kind == "PRP":
+        sketch.plates.append(replace(block, joint=name))
+    through = joints if each.kind == "PRP" else joints[1:]
+    for joint, link in zip(through, each.guides, strict=False):
+        if link == FRAME:
+            sketch.guides += _rails(sketch.joints[name], size)
+        elif joint != name:
+            sketch.bars.append(Bar((joint, name), (f"{at}.angle",)))
+
+
+def _rails(way: Floats, size: float) -> list[Floats]:
+    """Two lines beside the way of what slides on the frame."""
+    first, last = way[np.argmin(way[:, 0] + 1e-3 * way[:, 1])], way[np.argmax(way[:, 0] + 1e-3 * way[:, 1])]
+    if abs(last[0] - first[0]) < abs(np.ptp(way[:, 1])):
+        first, last = way[np.argmin(way[:, 1])], way[np.argmax(way[:, 1])]
+    length = float(np.sqrt(np.square(last - first).sum()))
+    along = (last - first) / length if length > 0.0 else np.array([1.0, 0.0])
+    across = np.array([-along[1], along[0]])
+    ends = np.array([first - 1.6 * size * along, last + 1.6 * size * along])
+    return [ends + side * size * across for side in (-0.75, 0.75)]
+
+
 _SKETCHES: Mapping[str, Callable[[_Numbers, Floats, Mechanism], Sketch]] = {
     "slider_crank": _slider_crank,
     "scotch_yoke": _scotch_yoke,
@@ -195,6 +274,7 @@ _SKETCHES: Mapping[str, Callable[[_Numbers, Floats, Mechanism], Sketch]] = {
     "drag_link": _drag_link,
     "toggle": _toggle,
     "cam": _cam,
+    "linkage": _linkage,
 }
 
 

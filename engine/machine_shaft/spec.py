@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, get_args
 
 from sprag_study.engine.machine_shaft.cams import CamLaw
+from sprag_study.engine.machine_shaft.elements import LinkageChoice
 from sprag_study.engine.machine_shaft.tables import Interpolation, Table
 
 MeanSpeed = Literal["midrange", "angle", "time"]
@@ -15,7 +16,7 @@ Flywheel = Literal["rim", "disc"]
 Stage = Literal["gear", "belt", "chain", "worm", "screw_nut", "rack"]
 MechanismKind = Literal[
     "none", "table", "formula", "slider_crank", "scotch_yoke", "four_bar", "parallel_crank",
-    "quick_return", "drag_link", "toggle", "cam",
+    "quick_return", "drag_link", "toggle", "cam", "linkage",
 ]  # fmt: skip
 Weights = Literal["ram", "all"]
 Bodies = Literal["full", "two_mass"]
@@ -60,7 +61,8 @@ class Drive:
 class MechanismChoice:
     """Which mechanism; ``table`` and ``formula`` give I''(phi) in kg*m^2.
 
-    A table of at most one revolution repeats every revolution. ``weights`` "all" adds those of rods, couplers, blocks
+    A table of at most one revolution repeats every revolution. ``linkage`` are the links of the kind "linkage".
+    ``weights`` "all" adds those of rods, couplers, blocks
     and trays to that of the ram; ``bodies`` "two_mass" replaces rods and couplers by masses on their two pins.
     """
 
@@ -72,6 +74,7 @@ class MechanismChoice:
     fall: CamLaw = "cycloidal"
     weights: Weights = "ram"
     bodies: Bodies = "full"
+    linkage: LinkageChoice | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,6 +175,10 @@ class MachineSpec:
                 table = own[name]["table"]
                 if table is not None:
                     table["rows"] = [list(row) for row in table["rows"]]
+        mechanisms = (self.mechanism, *(part.mechanism for part in self.parts))
+        for own, mechanism in zip((data, *parts), mechanisms, strict=True):
+            linkage = mechanism.linkage
+            own["mechanism"]["linkage"] = None if linkage is None else linkage.to_json()
         return data
 
     @classmethod
@@ -197,6 +204,8 @@ def _choices(data: Mapping[str, Any]) -> dict[str, Any]:
                 own["table"] = _table(own["table"])
             if "stages" in own:
                 own["stages"] = tuple(own["stages"])
+            if own.get("linkage") is not None:
+                own["linkage"] = LinkageChoice.from_json(own["linkage"])
             fields[name] = choice(**own)
     return fields
 

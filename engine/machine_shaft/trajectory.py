@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from sprag_study.engine.endings import ENDINGS, Ending
 from sprag_study.engine.machine_shaft.columns import Columns
 from sprag_study.engine.machine_shaft.decomposition import Decomposition
+from sprag_study.engine.machine_shaft.joints import reaction_columns
 from sprag_study.engine.machine_shaft.machine import Machine, check_structure
 from sprag_study.engine.machine_shaft.panels import Points
 from sprag_study.engine.machine_shaft.simulate import Solved, attempts, settle
@@ -56,7 +57,12 @@ def columns_of(model: MachineSpec) -> tuple[tuple[str, str], ...]:
         for prefix, part in model.every_part() if part.mechanism.kind == "slider_crank"
         for name, unit in _JOINT_COLUMNS
     )  # fmt: skip
-    return (*COLUMNS, *own, *joints)
+    linkages = (
+        (f"{prefix}joints.{name}", unit)
+        for prefix, part in model.every_part() if part.mechanism.linkage is not None
+        for name, unit in reaction_columns(part.mechanism.linkage)
+    )  # fmt: skip
+    return (*COLUMNS, *own, *joints, *linkages)
 
 
 def trajectory(model: MachineSpec, columns: Mapping[str, ArrayLike], angles: ArrayLike) -> Trajectory:
@@ -160,12 +166,20 @@ def _factor(machine: Machine, solved: Solved) -> float:
 
 
 def _joint_table(machine: Machine, solved: Solved, angles: Floats) -> dict[str, Floats]:
-    """Forces in the joints of the slider-cranks."""
+    """Forces in the joints of slider-cranks and linkages."""
     d = solved.decomposition
     table: dict[str, Floats] = {}
     points, cases = d.panels.locate(0, angles), np.zeros(len(angles), dtype=np.int64)
     factor, acceleration = _factor(machine, solved), d.acceleration()
+
+    def along(values: Floats) -> Floats:
+        shaped = np.ascontiguousarray(np.broadcast_to(values, d.panels.angles.shape))
+        return d.panels.at_rows(shaped, cases, points)
+
     for part in machine.parts:
+        if part.choice.mechanism.linkage is not None:
+            own = part.reactions(d.panels.angles, d.squares, acceleration, solved.omega, factor).table(along)
+            table |= {f"{part.prefix}joints.{name}": values for name, values in own.items()}
         if part.choice.mechanism.kind != "slider_crank":
             continue
         forces = part.joint_forces(d.panels.angles, d.squares, acceleration, solved.omega, factor)

@@ -61,6 +61,12 @@ ABOUT: Final[dict[str, About]] = {
         "a rim flywheel behind a belt and a gear: the rim that an irregularity needs, its stress, and the motor",
         "a press of 40 mm of stroke at 40 strokes a minute that punches with 250 kN over the last 30 degrees",
     ),
+    "six_bar_press": About(
+        32,
+        "a linkage of one's own, a list of pivots and groups of two links: irregularity against its rocker and the "
+        "flywheel",
+        "a bench press of about 0.1 m of stroke that stamps thin sheet with 4 kN over the last quarter",
+    ),
     "shaper": About(
         36,
         "a crank-shaper quick return under a cutting force over the slow stroke",

@@ -11,8 +11,8 @@ from sprag_study.worker.models.vocabulary import ordinal
 #: What parts of a machine are called that have a number.
 NUMBERED: Final = {
     "pendulums": N_("Pendulum {number}"), "parts": N_("Part {number}"), "stages": N_("Stage {number}"),
-    "steps": N_("Step {number}"), "axes": N_("Axis {number}"), "values": N_("Value {number}"),
-    "tolerances": N_("Tolerance {number}"), "subject_to": N_("Constraint {number}"),
+    "steps": N_("Step {number}"), "elements": N_("Element {number}"), "axes": N_("Axis {number}"),
+    "values": N_("Value {number}"), "tolerances": N_("Tolerance {number}"), "subject_to": N_("Constraint {number}"),
 }  # fmt: skip
 #: Parts of a spec beside those of a machine.
 PARTS: Final = (

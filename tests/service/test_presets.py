@@ -126,6 +126,10 @@ def test_what_the_machines_show() -> None:
     assert set(endings) == {"ok", "motor_stalled"}
     assert decreasing(slotter["omega.mean"], 0)
     assert decreasing(slotter["drive_torque.max"], 1)
+    _, endings, six_bar = run("six_bar_press")
+    assert set(endings) == {"ok"}
+    assert increasing(six_bar["irregularity"], 0)
+    assert decreasing(six_bar["irregularity"], 1)
     study, _, compressor = run("compressor")
     assert increasing(compressor["required_inertia"], 0)
     pressure: Any = np.array(study.axes[0].values)[:, None]

@@ -12,8 +12,9 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 #: How the text of a field is read: as a number or choice that a catalogue describes, a number, a text as it is, a list,
-#: a table of two columns, measured rows, lines of names with numbers, lines of steps; or whether it is ticked.
-FieldKind = Literal["", "number", "text", "list", "table", "measured", "constants", "steps", "tick"]
+#: a table of two columns, measured rows, lines of names with numbers, lines of steps or of elements of a linkage; or
+#: whether it is ticked.
+FieldKind = Literal["", "number", "text", "list", "table", "measured", "constants", "steps", "elements", "tick"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -353,6 +353,26 @@ class ShaftMechanismCam(TypedDict, total=False):
     inclination: Quantity
 
 
+class ShaftMechanismLinkage(TypedDict, total=False):
+    """A planar linkage of one's own: a crank, and groups of two links that are attached to it one after the other.
+
+    crank : Length of the crank (r), m; > 0 m and <= 1000 m.
+    inclination : Rise of the x axis above the level (beta), rad; >= -6.28319 rad and <= 6.28319 rad.
+    elements : Pivots, points and groups, each after those to which it is attached; fields kind, name, from, to, guide,
+        guide_2, on, branch, x, y, along, across, mass, first, first_centre, first_across, first_mass, first_inertia,
+        second, second_centre, second_across, second_mass, second_inertia, angle, offset, inertia, block_mass,
+        slot_angle, angle_2, offset_2; needed: kind, name.
+    working : Joint of the working part: a slider on the frame, or a joint on an arc; by default none.
+    forward : Forward stroke along the guide or counterclockwise, or the other way.
+    """
+
+    crank: Quantity
+    inclination: Quantity
+    elements: Sequence[Mapping[str, Any]]
+    working: str
+    forward: Literal["positive", "negative"]
+
+
 class ShaftMechanism(TypedDict, total=False):
     """What the shaft drives: a table, a formula, or dimensions and masses.
 
@@ -376,6 +396,8 @@ class ShaftMechanism(TypedDict, total=False):
         rod.
     cam : Fields rise, fall, lift, start, rise_angle, dwell_angle, fall_angle, follower_mass, spring_rate,
         spring_preload, inclination; needed: lift, rise_angle, fall_angle.
+    linkage : A planar linkage of one's own: a crank, and groups of two links that are attached to it one after the
+        other; fields crank, inclination, elements, working, forward; needed: crank, elements.
     interpolation : How rows of the table are joined: without overshoot, or by straight lines.
     """
 
@@ -390,6 +412,7 @@ class ShaftMechanism(TypedDict, total=False):
     parallel_crank: ShaftMechanismParallelCrank
     quick_return: ShaftMechanismQuickReturn
     cam: ShaftMechanismCam
+    linkage: ShaftMechanismLinkage
     interpolation: Literal["smooth", "linear"]
 
 
@@ -479,7 +502,8 @@ class ShaftPart(TypedDict, total=False):
 
     crank_angle : Angle of the part's crank at the shaft's angle 0 (alpha), rad; >= -100 rad and <= 100 rad.
     mechanism : What the shaft drives: a table, a formula, or dimensions and masses; fields table, csv, formula,
-        slider_crank, four_bar, drag_link, toggle, scotch_yoke, parallel_crank, quick_return, cam, interpolation.
+        slider_crank, four_bar, drag_link, toggle, scotch_yoke, parallel_crank, quick_return, cam, linkage,
+        interpolation.
     operation : What resists; fields value, steps, table, csv, formula, gas, indicator, quantity, over, during, sense,
         interpolation, scale, efficiency, recorded_at.
     """
@@ -597,6 +621,30 @@ class Shaft(Studies):
         "mechanism.cam.spring_rate",
         "mechanism.cam.spring_preload",
         "mechanism.cam.inclination",
+        "mechanism.linkage.crank",
+        "mechanism.linkage.inclination",
+        "mechanism.linkage.elements.*.x",
+        "mechanism.linkage.elements.*.y",
+        "mechanism.linkage.elements.*.along",
+        "mechanism.linkage.elements.*.across",
+        "mechanism.linkage.elements.*.mass",
+        "mechanism.linkage.elements.*.first",
+        "mechanism.linkage.elements.*.first_centre",
+        "mechanism.linkage.elements.*.first_across",
+        "mechanism.linkage.elements.*.first_mass",
+        "mechanism.linkage.elements.*.first_inertia",
+        "mechanism.linkage.elements.*.second",
+        "mechanism.linkage.elements.*.second_centre",
+        "mechanism.linkage.elements.*.second_across",
+        "mechanism.linkage.elements.*.second_mass",
+        "mechanism.linkage.elements.*.second_inertia",
+        "mechanism.linkage.elements.*.angle",
+        "mechanism.linkage.elements.*.offset",
+        "mechanism.linkage.elements.*.inertia",
+        "mechanism.linkage.elements.*.block_mass",
+        "mechanism.linkage.elements.*.slot_angle",
+        "mechanism.linkage.elements.*.angle_2",
+        "mechanism.linkage.elements.*.offset_2",
         "operation.value",
         "operation.steps.*.from",
         "operation.steps.*.to",
@@ -694,6 +742,30 @@ class Shaft(Studies):
         "parts.*.mechanism.cam.spring_rate",
         "parts.*.mechanism.cam.spring_preload",
         "parts.*.mechanism.cam.inclination",
+        "parts.*.mechanism.linkage.crank",
+        "parts.*.mechanism.linkage.inclination",
+        "parts.*.mechanism.linkage.elements.*.x",
+        "parts.*.mechanism.linkage.elements.*.y",
+        "parts.*.mechanism.linkage.elements.*.along",
+        "parts.*.mechanism.linkage.elements.*.across",
+        "parts.*.mechanism.linkage.elements.*.mass",
+        "parts.*.mechanism.linkage.elements.*.first",
+        "parts.*.mechanism.linkage.elements.*.first_centre",
+        "parts.*.mechanism.linkage.elements.*.first_across",
+        "parts.*.mechanism.linkage.elements.*.first_mass",
+        "parts.*.mechanism.linkage.elements.*.first_inertia",
+        "parts.*.mechanism.linkage.elements.*.second",
+        "parts.*.mechanism.linkage.elements.*.second_centre",
+        "parts.*.mechanism.linkage.elements.*.second_across",
+        "parts.*.mechanism.linkage.elements.*.second_mass",
+        "parts.*.mechanism.linkage.elements.*.second_inertia",
+        "parts.*.mechanism.linkage.elements.*.angle",
+        "parts.*.mechanism.linkage.elements.*.offset",
+        "parts.*.mechanism.linkage.elements.*.inertia",
+        "parts.*.mechanism.linkage.elements.*.block_mass",
+        "parts.*.mechanism.linkage.elements.*.slot_angle",
+        "parts.*.mechanism.linkage.elements.*.angle_2",
+        "parts.*.mechanism.linkage.elements.*.offset_2",
         "parts.*.operation.value",
         "parts.*.operation.steps.*.from",
         "parts.*.operation.steps.*.to",
@@ -750,7 +822,8 @@ class Shaft(Studies):
             Which mean of the speed the given mean speed and the irregularity refer to.
         mechanism : values, optional
             What the shaft drives: a table, a formula, or dimensions and masses; fields table, csv, formula,
-            slider_crank, four_bar, drag_link, toggle, scotch_yoke, parallel_crank, quick_return, cam, interpolation.
+            slider_crank, four_bar, drag_link, toggle, scotch_yoke, parallel_crank, quick_return, cam, linkage,
+            interpolation.
         operation : values, optional
             What resists; fields value, steps, table, csv, formula, gas, indicator, quantity, over, during, sense,
             interpolation, scale, efficiency, recorded_at.

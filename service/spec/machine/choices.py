@@ -72,6 +72,10 @@ def _mechanism_choices(mechanism: Mapping[str, Any]) -> Iterator[tuple[str, str]
     for name in ("rise", "fall", "weights", "bodies"):
         if name in mechanism:
             yield f"mechanism.{mechanism['kind']}.{name}", mechanism[name]
+    if mechanism.get("linkage"):
+        linkage = mechanism["linkage"]
+        yield "mechanism.linkage.elements", ", ".join(f"{each['kind']} {each['name']}" for each in linkage["elements"])
+        yield "mechanism.linkage.forward", "negative" if linkage["reversed"] else "positive"
     if mechanism.get("table"):
         yield "mechanism.interpolation", mechanism["table"]["interpolation"]
 

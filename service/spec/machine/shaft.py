@@ -19,6 +19,7 @@ from sprag_study.service.spec.machine.machine import Machine
 from sprag_study.service.spec.machine.part import read_numbers
 from sprag_study.service.spec.machine.shaft_check import check_machine
 from sprag_study.service.spec.machine.shaft_drive import BALANCE, BALANCE_SIDE, DRIVE, read_balance, read_drive
+from sprag_study.service.spec.machine.shaft_numbers import numbers_under
 from sprag_study.service.spec.machine.shaft_parts import (
     CONSTANTS,
     CYCLE,
@@ -26,7 +27,6 @@ from sprag_study.service.spec.machine.shaft_parts import (
     OPERATION,
     PARTS,
     PHI_C,
-    numbers_under,
     read_constants,
     read_cycle,
     read_mechanism,
@@ -65,11 +65,14 @@ SHAFT: Final = Record(
     "the machine that every case begins from",
     required=("drive",),
 )
-_INDEXED = re.compile(r"(?:parts\.[0-9]{1,9}\.)?(operation\.steps|drive\.stages)\.([0-9]{1,9})\.")
+_INDEXED = re.compile(
+    r"(?:parts\.[0-9]{1,9}\.)?(operation\.steps|drive\.stages|mechanism\.linkage\.elements)\.([0-9]{1,9})\."
+)
 #: What is said about a step or a stage that there is not.
 _NO_ITEM: Final = {
     "steps": N_("there is no step {number}: steps are numbered from 0 to {last}"),
     "stages": N_("there is no stage {number}: stages are numbered from 0 to {last}"),
+    "elements": N_("there is no element {number}: elements are numbered from 0 to {last}"),
 }
 _PART: Final = re.compile(r"parts\.([0-9]{1,9})\.")
 
@@ -107,6 +110,7 @@ class ShaftMachine(Machine):
             owner = several[int(part[1])] if part and several else structure
             counts = {
                 "steps": int(owner["operation"]["steps"]), "stages": len(structure["drive"].get("stages", ())),
+                "elements": len((owner["mechanism"].get("linkage") or {}).get("elements", ())),
             }  # fmt: skip
             if int(item[2]) >= counts[name] > 0:
                 return Sentence(_NO_ITEM[name], number=item[2], last=str(counts[name] - 1))

@@ -7,14 +7,12 @@ from typing import Any, Final
 
 from sprag_study.sentences import Sentence
 from sprag_study.service.spec.described import Listed, Record, Variants, choice
+from sprag_study.service.spec.machine.shaft_numbers import numbers_of, numbers_under, refuse_foreign
 from sprag_study.service.spec.machine.shaft_parts import (
     ANGLE,
     INTERPOLATION,
     diagram_of,
-    numbers_of,
-    numbers_under,
     read_diagram,
-    refuse_foreign,
     rows_of,
     value_in,
 )

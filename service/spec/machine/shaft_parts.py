@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Final
 
 from sprag_study.sentences import Sentence, plural
@@ -12,10 +12,11 @@ from sprag_study.service.languages import N_
 from sprag_study.service.reading.catalogue import range_sentence
 from sprag_study.service.reading.units import parse_quantity
 from sprag_study.service.spec.described import Described, Field, Listed, Record, choice, named
+from sprag_study.service.spec.machine.linkage import LINKAGE, read_linkage
+from sprag_study.service.spec.machine.shaft_numbers import numbers_under
 from sprag_study.service.spec.machine.shaft_tables import read_csv_rows
 from sprag_study.service.spec.node import Node
 from sprag_study.service.spec.schema.quantity import QUANTITY, required_of
-from sprag_study.worker import models
 from sprag_study.worker.models import Parameter, machine_shaft
 
 _PHI_C_HELP: Final = (
@@ -69,13 +70,6 @@ _FRACTION = Parameter("fraction", "x", "1", 0.0, 1.0, False, None, "fraction of 
 _PLACES: Final = {"angle": ANGLE, "stroke": _FRACTION, "time": _TIME}
 
 
-def numbers_under(prefix: str) -> dict[str, Parameter]:
-    """The numbers directly under ``prefix`` (with its last dot) in the catalogue, by their names."""
-    entries = {entry.path: entry for entry in models.parameter_catalogue(models.MACHINE_SHAFT)}
-    below = {path.removeprefix(prefix): entry for path, entry in entries.items() if path.startswith(prefix)}
-    return {name: entry for name, entry in below.items() if "." not in name}
-
-
 _ROWS: Final = Listed(
     "rows", 2, machine_shaft.MAX_ROWS, item={"type": "array", "minItems": 2, "maxItems": 2, "items": QUANTITY}
 )
@@ -121,9 +115,9 @@ _REDUCED: Final = diagram_of(
     "angle (rad) and reduced inertia (kg*m^2)", "reduced inertia in kg*m^2 as a formula of phi (rad)"
 )
 MECHANISM: Final = Record(
-    {**_REDUCED, **_KINDS, "interpolation": INTERPOLATION},
+    {**_REDUCED, **_KINDS, "linkage": LINKAGE, "interpolation": INTERPOLATION},
     "what the shaft drives: a table, a formula, or dimensions and masses",
-    either=(*_REDUCED, *_KINDS),
+    either=(*_REDUCED, *_KINDS, "linkage"),
 )
 _GAS: Final = Record(
     numbers_under("operation.gas."), "a gas drawn in and compressed by the working part",
@@ -210,17 +204,6 @@ def read_constants(node: Node) -> list[str] | None:
     return sorted(data) if node.sound else None
 
 
-def numbers_of(structure: Mapping[str, Any], prefix: str) -> list[str]:
-    return [path.removeprefix(prefix) for path in machine_shaft.parameters_of(structure) if path.startswith(prefix)]
-
-
-def refuse_foreign(node: Node, own: Sequence[str], what: Sentence) -> None:
-    for name in node.value:
-        if name not in own:
-            message = Sentence("is not a field of {what}", what=what)
-            node[name].refuse("unknown-field", message, allowed=", ".join(own))
-
-
 def read_mechanism(node: Node, places: dict[str, str], prefix: str = "") -> dict[str, Any] | None:
     """Read the mechanism: its kind and its non-numeric fields."""
     places[f"{prefix}mechanism"] = node.pointer
@@ -236,6 +219,9 @@ def read_mechanism(node: Node, places: dict[str, str], prefix: str = "") -> dict
         return diagram and {"kind": diagram["form"], "table": diagram["table"], "formula": diagram["formula"]}
     if "interpolation" in node:
         node["interpolation"].refuse("not-used", "applies to a table, and there is none")
+    if kind == "linkage":
+        linkage = read_linkage(own)
+        return linkage and {"kind": kind, "linkage": linkage}
     record = _KINDS[kind]
     if not record.read(own):
         return None

@@ -1,6 +1,15 @@
 """The model of machine shafts: a drive turns a shaft steadily against mechanisms and their resistance."""
 
 from sprag_study.engine.formulas.expressions import ExpressionError
+from sprag_study.engine.machine_shaft.elements import (
+    BRANCHES,
+    ELEMENT_KINDS,
+    FRAME,
+    MAX_ELEMENTS,
+    SHAFT,
+    LinkageChoice,
+    element_faults,
+)
 from sprag_study.engine.machine_shaft.problems import RelationError
 from sprag_study.engine.machine_shaft.sketch import Sketch
 from sprag_study.engine.machine_shaft.spec import LINKED, MAX_CONSTANTS, MAX_PARTS, MAX_STAGES, MAX_STEPS, REVOLUTIONS
@@ -22,8 +31,12 @@ from sprag_study.worker.models.machine_shaft.model import (
 )
 
 __all__ = [
+    "BRANCHES",
+    "ELEMENT_KINDS",
+    "FRAME",
     "LINKED",
     "MAX_CONSTANTS",
+    "MAX_ELEMENTS",
     "MAX_PARTS",
     "MAX_ROWS",
     "MAX_STAGES",
@@ -31,9 +44,11 @@ __all__ = [
     "MODEL",
     "REMARKS",
     "REVOLUTIONS",
+    "SHAFT",
     "SHAPE",
     "STAGE_KINDS",
     "ExpressionError",
+    "LinkageChoice",
     "MachineError",
     "MachineShaft",
     "RelationError",
@@ -41,6 +56,7 @@ __all__ = [
     "base_results",
     "check",
     "check_structure",
+    "element_faults",
     "parameters_of",
     "reachable_pressure",
     "sketches_of",

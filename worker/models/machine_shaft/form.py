@@ -51,6 +51,26 @@ def _mechanism(kind: str) -> Option:
     return Option(kind, "", (*choices, FormField(f"{at}/*", hidden=tuple(hidden))), at=at)
 
 
+_LINKAGE_HELP: Final = (
+    "one a line, each after those to which it is attached: kind and name; its fields with = between semicolons"
+)
+_LINKAGE: Final = Option(
+    "linkage", "", (
+        FormField("mechanism/linkage/crank"),
+        FormField(
+            "mechanism/linkage/elements", "elements", "Elements", _LINKAGE_HELP, required=True, lines=5,
+            example="pivot B; x = 220 mm\nRRR C; from = A; to = B; first = 200 mm; second = 130 mm",
+        ),
+        FormField(
+            "mechanism/linkage/working", "text", "Working part", "joint of the ram or of the rocker's pin",
+            default="none", example="C",
+        ),
+        FormField("mechanism/linkage/forward"),
+        FormField("mechanism/linkage/inclination"),
+    ), at="mechanism/linkage",
+)  # fmt: skip
+
+
 def _balance(kind: str) -> dict[str, str]:
     return {"balance": kind, "balance_side": "drive"}
 
@@ -99,6 +119,7 @@ _MECHANISM: Final = FormChoice(
     options=(
         Option("none", "none"),
         *map(_mechanism, _MECHANISMS),
+        _LINKAGE,
         Option("formula", "inertia as a formula", (_formula("mechanism"),), at="mechanism/formula"),
         Option("csv", "inertia as a table", _table("mechanism", "angle [deg],inertia [kg*m^2]", "angle", "inertia"),
                at="mechanism/csv"),
@@ -187,7 +208,7 @@ FORM: Final = Form(
         r"drive\.motor\.(?!inertia).*", r"drive\.flywheel\.(mass|diameter)",
         r"drive\.stages\.N\.(kind|ratio|lead|radius)", r"(parts\.N\.)?(mechanism|operation|crank_angle)",
         r"(parts\.N\.)?mechanism\.\w+\.(?!(kind|bodies|weights|rise|fall|inclination|.*_(centre|inertia|angle))$).*",
-        r"(parts\.N\.)?mechanism\.(formula|csv|cam\.\w+_angle)",
+        r"(parts\.N\.)?mechanism\.(formula|csv|cam\.\w+_angle|linkage\.(elements|working))",
         r"(parts\.N\.)?operation\.(quantity|over|value|steps|formula|csv|scale|gas\.\w+_(area|pressure)|indicator\.csv)",
     ),
     examples={
@@ -200,5 +221,5 @@ FORM: Final = Form(
         ("drive.flywheel.", "Flywheel"), ("drive.motor.", "Motor"), ("drive.stages.", "Stages"), ("drive.", "Drive"),
         ("mechanism.", "Mechanism"), ("operation.", "Operation"), ("constants.", "Constants"), ("", "Machine"),
     ),
-    nameless=r"(parts\.\d+\.)?((mechanism\.\w+|operation(\.gas|\.indicator)?|drive|constants)\.)?",
+    nameless=r"(parts\.\d+\.)?((mechanism\.linkage\.elements|mechanism\.\w+|operation(\.gas|\.indicator)?|drive|constants)\.)?",
 )  # fmt: skip

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, cast, get_args
 import numpy as np
 
 from sprag_study.engine import Ending
+from sprag_study.engine.machine_shaft.elements import ELEMENT_KINDS, Element, LinkageChoice
 from sprag_study.engine.machine_shaft.parameters import parameters as _engine_parameters
 from sprag_study.engine.machine_shaft.results import result_infos
 from sprag_study.engine.machine_shaft.spec import (
@@ -72,6 +73,8 @@ def catalogue() -> tuple[Parameter, ...]:
     every += [MachineSpec(drive=Drive(stages=(stage,))) for stage in get_args(Stage)]
     every += [MachineSpec(mechanism=MechanismChoice(kind)) for kind in kinds]
     every += [MachineSpec(mechanism=MechanismChoice("four_bar", weights="all"))]
+    elements = (LinkageChoice((Element(kind, "X"),)) for kind in ELEMENT_KINDS)
+    every += [MachineSpec(mechanism=MechanismChoice("linkage", linkage=own)) for own in elements]
     forms = (
         OperationChoice("force"),
         OperationChoice("force", "steps", steps=1),
@@ -84,6 +87,7 @@ def catalogue() -> tuple[Parameter, ...]:
     for spec in every:
         for entry in _engine_parameters(spec):
             path = entry.path.replace(".steps.0.", ".steps.K.").replace(".stages.0.", ".stages.K.")
+            path = path.replace(".elements.0.", ".elements.K.")
             path = path.replace("parts.0.", "parts.N.")
             found.setdefault(path, replace(entry, path=path, help=entry.help + REMARKS.get(path, "")))
     shaft = ("mean_speed", "wanted_irregularity", "friction_torque", "gravity", "drive")

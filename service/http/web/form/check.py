@@ -13,6 +13,7 @@ from sprag_study.service.figures.drawing import Drawing
 from sprag_study.service.figures.drawings import BETWEEN_FIELDS, drawings
 from sprag_study.service.http.web.figures.fits import FitChart, fit_at
 from sprag_study.service.http.web.form.columns import COLUMNS
+from sprag_study.service.http.web.form.element_lines import element_of
 from sprag_study.service.http.web.form.entries import Faults
 from sprag_study.service.http.web.form.machine import model_name, places
 from sprag_study.service.http.web.form.machine_spec import step_of
@@ -193,7 +194,7 @@ def check_form(
             if not (name in faults and name.endswith("/data")):
                 texts = found.faults.setdefault(name, [])
                 # One field can stand for several places of the spec, as the value of a parameter at all points does.
-                text = step_of(item.where or "") + message(item)
+                text = (step_of(item.where or "") or element_of(item.where or "")) + message(item)
                 texts += [text] if text not in texts else []
     if values.get(COLUMNS, "").strip() and "axes" in spec:
         found.faults[COLUMNS] = [_("has columns that are not used yet; make axes of them, or empty the field")]

@@ -8,6 +8,7 @@ from itertools import pairwise
 from typing import Any, Final
 
 from sprag_study.service.faults import Fault
+from sprag_study.service.http.web.form.element_lines import elements_of, lines_of
 from sprag_study.service.http.web.form.entries import (
     Faults,
     Values,
@@ -133,6 +134,11 @@ def _read(entry: Entry, text: str, faults: Faults) -> Any:
             return _constants(entry.name, text, faults)
         case "steps":
             return _steps(text)
+        case "elements":
+            wrong: list[str] = []
+            elements = elements_of(text, wrong)
+            faults.update({entry.name: wrong} if wrong else {})
+            return elements
         case "text" | "table":
             return text.strip()
     return text.strip() if entry.field.choices else plain(text)
@@ -284,6 +290,8 @@ def _text(entry: Entry, base: Mapping[str, Any]) -> str | None:
             return "\n".join(f"{name} = {text_of(item)}" for name, item in value.items())
         case "steps":
             return "\n".join("; ".join(text_of(step[name]) for name in _STEP) for step in value)
+        case "elements":
+            return lines_of(value)
     if isinstance(value, Mapping | list):
         raise ValueError("the form has no fields for all of this machine")
     return text_of(value)
