@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
+from sprag_study.service.http.views import preset_of
 from sprag_study.service.http.web.form.element_lines import element_of, elements_of, lines_of
 from sprag_study.service.http.web.form.machine_spec import base_of, values_of_base
-from sprag_study.service.presets import preset_of
 from sprag_study.service.spec.document import parse_spec
 from sprag_study.service.spec.report import SpecError
 
