@@ -13,6 +13,8 @@ _FORMULA, _OWN, _SWITCHES = 0.1, 0.7, 1.0
 _PEAK = 12.0
 #: Additional time of each part beyond the first.
 _PART = 0.2
+#: Additional time of each group of a linkage, for its motion, its limits and its reversals.
+_GROUP = 7.0
 #: Additional time of a formula that follows the speed, which is then iterated.
 _SPEED = 12.0
 _SHARP = frozenset({"exp", "tanh", "sinh", "cosh", "atan"})
@@ -28,6 +30,8 @@ def estimate_seconds(model: MachineSpec) -> float:
     factor = 8.0 if model.balance == "motor" else _COST[model.mean_speed_is]
     factor += sum(_formula_cost(part.formula, model.constants) for part in parts if part.formula is not None)
     factor += _PART * (len(every) - 1)
+    elements = (each for part in every if part.mechanism.linkage for each in part.mechanism.linkage.elements)
+    factor += _GROUP * sum(each.kind not in {"pivot", "point"} for each in elements)
     return 1e-5 + factor * 7e-6 * panels
 
 
