@@ -63,8 +63,9 @@ def test_a_fault_stands_at_its_field(index: int, field: str, value: Any, code: s
         element[field] = value
     with pytest.raises(SpecError) as error:
         parse_spec(document)
-    faults = {(fault.where, fault.code, str(fault.message)) for fault in error.value.faults}
-    assert (f"{ELEMENTS}/{index}/{field}", code, text) in faults
+    place = f"{ELEMENTS}/{index}/{field}"
+    messages = [str(fault.message) for fault in error.value.faults if (fault.where, fault.code) == (place, code)]
+    assert [message[: len(text)] for message in messages] == [text]
 
 
 def test_the_working_part_and_links_that_do_not_reach() -> None:
