@@ -18,6 +18,7 @@ from sprag_study.service.spec.kinds.registry import without_cases
 from sprag_study.worker import models
 from sprag_study.worker.planning.goals import GoalPlan, GoalPlanner, front
 from sprag_study.worker.planning.goals.polish import MET
+from sprag_study.worker.planning.goals.record import serve_derivatives
 from sprag_study.worker.planning.rounds import Rows
 
 if TYPE_CHECKING:
@@ -57,8 +58,8 @@ class Search:
         self._planner = GoalPlanner(self._plan)
         self._step = self._planner.ask()
         self._told: list[Rows] = []
-        #: What each of these rounds was for: "search" or "polish".
-        self._phases: list[str] = []
+        #: The summaries that these rounds were asked for with.
+        self._summaries: list[Mapping[str, Any]] = []
 
     def __repr__(self) -> str:
         told = sum(len(rows.points) for rows in self._told) // self._plan.cases_each
@@ -151,9 +152,9 @@ class Search:
         return table.iloc[np.lexsort((np.arange(len(table)), first, ranked.rank))[:limit]]
 
     def _ranked_rows(self) -> Rows:
-        """The rows of all rounds but that which only gives the derivatives of the polish."""
-        derivatives = self._phases.index("polish") if "polish" in self._phases else None
-        rounds = [rows for number, rows in enumerate(self._told) if number != derivatives]
+        """The rows of all rounds but those which only give derivatives."""
+        aside = serve_derivatives(self._summaries)
+        rounds = [rows for rows, derivatives in zip(self._told, aside, strict=True) if not derivatives]
         if not rounds:
             nothing = np.empty(0)
             return Rows(self._step.points[:0], nothing.astype(np.bool_), dict.fromkeys(self.values, nothing))
@@ -173,7 +174,7 @@ class Search:
         return self._infos[name].unit if name in self._infos else "1"
 
     def _take(self, rows: Rows) -> None:
-        self._phases.append(self._step.summary["phase"])
+        self._summaries.append(self._step.summary)
         self._told.append(rows)
         self._planner.tell(rows)
         self._step = self._planner.ask()

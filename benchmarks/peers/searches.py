@@ -81,6 +81,45 @@ def pymoo_nsga2(problem: Problem, population: int, generations: int, seed: int) 
     return Found(last.get("F")[last.get("FEAS").ravel()], np.concatenate(feasible))
 
 
+def pymoo_one_goal(name: str, problem: Problem, population: int, generations: int, seed: int) -> tuple[float, int]:
+    """The best feasible value, inf without one, of pymoo's search of that name for one goal, and the designs it took.
+
+    "GA" and "DE" have pymoo's default settings. "CMAES", which knows no limits, gets their violations as a price.
+    """
+    from pymoo.algorithms.soo.nonconvex.cmaes import CMAES
+    from pymoo.algorithms.soo.nonconvex.de import DE
+    from pymoo.algorithms.soo.nonconvex.ga import GA
+    from pymoo.core.problem import Problem as PymooProblem
+    from pymoo.optimize import minimize
+
+    best, taken, most = np.inf, 0, population * generations
+    priced = name == "CMAES"
+
+    class Wrapped(PymooProblem):  # type: ignore[misc]
+        def __init__(self) -> None:
+            limits = 0 if priced else problem.limits
+            super().__init__(n_var=len(problem.low), n_obj=1, n_ieq_constr=limits, xl=problem.low, xu=problem.high)
+
+        def _evaluate(self, designs: Floats, out: dict[str, Any], *_: Any, **__: Any) -> None:
+            nonlocal best, taken
+            goals, limits = _plain(problem, designs)
+            counted = slice(0, most - taken)
+            feasible = goals[counted][(limits[counted] <= 0.0).all(axis=1)]
+            best, taken = min(best, float(feasible.min(initial=np.inf))), min(taken + len(designs), most)
+            excess = np.maximum(limits, 0.0).sum(axis=1, keepdims=True)
+            out["F"] = goals + 1e6 * excess if priced else goals
+            if problem.limits and not priced:
+                out["G"] = limits
+
+    searches: dict[str, Callable[[], Any]] = {
+        "GA": lambda: GA(pop_size=population),
+        "DE": lambda: DE(pop_size=population),
+        "CMAES": lambda: CMAES(restarts=9, bipop=True),
+    }
+    minimize(Wrapped(), searches[name](), ("n_evals", most), seed=seed)
+    return best, taken
+
+
 def optuna_nsga2(problem: Problem, population: int, generations: int, seed: int) -> Found:
     """The search of Optuna's NSGAIISampler with its default settings."""
     import optuna

@@ -27,6 +27,7 @@ from sprag_study.worker.limits import (
     MIN_SETTLED_PERIODS,
     NARROW_STEPS,
 )
+from sprag_study.worker.planning.goals.plan import GENERATIONS
 
 
 def extend(
@@ -42,18 +43,30 @@ def extend(
     points: Annotated[
         str | None, typer.Option("--points", metavar="FILE", help="CSV file of further cases, a header of paths.")
     ] = None,
+    generations: Annotated[
+        int | None,
+        typer.Option(
+            "--generations",
+            min=GENERATIONS[0],
+            max=GENERATIONS[1],
+            help="Further generations of a search with a goal, beyond those that it came to.",
+            show_default=False,
+        ),
+    ] = None,
     wait: Wait = False,
     timeout: WaitTimeout = None,
 ) -> None:
-    """Submit a study with more values on the axes of an old one, or more cases; only new cases are run."""
+    """Submit a study with more values on the axes of an old one, more cases or more generations; only new cases run."""
     from sprag_study.service.client.wire import study_path
 
-    addition = _addition(axis or [], points)
+    addition = _addition(axis or [], points, generations)
     with connection() as client:
         study_id = study_of(client, study_id)
         old = client.request("GET", study_path(study_id))
         study = further(client, study_id, "extend", json=addition)
-        say(_what_is_new(old, study))
+        say(
+            _what_is_new(old, study) if generations is None else _("the designs of {study} are reused", study=old["id"])
+        )
         submitted(client, study, wait, timeout)
 
 
@@ -127,12 +140,14 @@ def _what_is_new(old: Mapping[str, Any], study: Mapping[str, Any]) -> str:
     )
 
 
-def _addition(axes: list[str], points: str | None) -> dict[str, Any]:
-    if bool(axes) == (points is not None):
-        message = N_("or --points is needed, and not both")
+def _addition(axes: list[str], points: str | None, generations: int | None) -> dict[str, Any]:
+    if [bool(axes), points is not None, generations is not None].count(True) != 1:
+        message = N_("or --points or --generations is needed, and only one of them")
         raise wrong_option(
             "--axis", "exactly-one", message, allowed="--axis shaft.load=0.5,0.7", detail=_("missing option")
         )
+    if generations is not None:
+        return {"generations": generations}
     if points is not None:
         return {"cases": [{"points": decode(points, read_bytes(points, MAX_BODY_BYTES))}]}
     made = []

@@ -109,10 +109,13 @@ def _texts(name: str, value: object) -> list[str]:
 
 
 def extension(
-    axes: Sequence[Mapping[str, Any]] | None, cases: Sequence[Mapping[str, Any]] | None, name: str | None
+    axes: Sequence[Mapping[str, Any]] | None,
+    cases: Sequence[Mapping[str, Any]] | None,
+    generations: int | None,
+    name: str | None,
 ) -> dict[str, Any]:
     """Body of an extension of a study."""
-    parts = {"axes": axes, "cases": cases, "name": name}
+    parts = {"axes": axes, "cases": cases, "generations": generations, "name": name}
     return {key: value for key, value in parts.items() if value is not None}
 
 

@@ -95,9 +95,11 @@ def extended_study(library: Library, study_id: str, body: Body, warnings: Sequen
     """
     study = library.store.studies.study(study_id)
     addition = body.data()
-    parsed = parse_extended(accepted(library.store.studies.spec(study_id), study), study, addition)
+    rounds = library.store.studies.rounds(study_id) if study.plan is not None else []
+    came_to = rounds[-1].summary.get("generation") if rounds else None
+    parsed = parse_extended(accepted(library.store.studies.spec(study_id), study), study, addition, came_to)
     named = isinstance(addition, Mapping) and "name" in addition
-    nothing_new = parsed.study.cases == study.cases and not named
+    nothing_new = study.plan is None and parsed.study.cases == study.cases and not named
     return replace(
         parsed, warnings=(*warnings, *parsed.warnings), same_as=study_id if nothing_new else "", follows=not named
     )

@@ -23,6 +23,7 @@ from sprag_study.worker.models import WorkerEnding
 from sprag_study.worker.planning.goals import GoalPlan, front
 from sprag_study.worker.planning.goals.plan import GOAL
 from sprag_study.worker.planning.goals.polish import MET
+from sprag_study.worker.planning.goals.record import serve_derivatives
 from sprag_study.worker.planning.goals.robust import Table
 from sprag_study.worker.planning.rounds import Rows
 
@@ -116,7 +117,7 @@ def goal_of(study: Study) -> GoalPlan:
 
 
 def designs_of(study: Study, rounds: list[RoundRecord], fetch: Fetch, *, exact: bool = False) -> Designs:
-    """All designs of ``study`` but those that serve the derivatives of the polish only, ranked.
+    """All designs of ``study`` but those that serve derivatives only, ranked.
 
     Parameters
     ----------
@@ -175,10 +176,10 @@ def _regimes(regime: ResultInfo, codes: Floats) -> list[list[str | None]]:
 
 
 def _for_derivatives(rounds: Sequence[RoundRecord], designs: int, each: int) -> Bools:
-    """Which designs the polish ran for its derivatives only: those of its first round."""
-    first = next((one.cases for one in rounds if one.summary.get("phase") == "polish"), range(0))
+    """Which designs the polish and the finish ran for their derivatives only."""
     marked = np.zeros(designs, dtype=np.bool_)
-    marked[first.start // each : first.stop // each] = True
+    for record, aside in zip(rounds, serve_derivatives([one.summary for one in rounds]), strict=True):
+        marked[record.cases.start // each : record.cases.stop // each] |= aside
     return marked
 
 

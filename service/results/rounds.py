@@ -125,7 +125,8 @@ def _search(summary: dict[str, Any], units: Sequence[str]) -> list[Phrase]:
     parts = [Phrase("generation {number} of {most}", number=generation + 1, most=generations)]
     if summary["phase"] != "search":
         parts = [plural("{count} generation", "{count} generations", generation)]
-        parts += [] if summary["phase"] == "ended" else [Phrase("polish of equalities")]
+        end = Phrase("finish by derivatives") if "finish" in summary else Phrase("polish of equalities")
+        parts += [] if summary["phase"] == "ended" else [end]
     reached = zip(summary["best"], units or [""] * len(summary["best"]), strict=True)
     best = joined(" / ", (Amount(value, unit, 3) for value, unit in reached if value is not None))
     exact = (summary["polish"] or {}).get("met", 0)

@@ -1,4 +1,4 @@
-"""Extension of a study: further values on its axes, further axes, further cases.
+"""Extension of a study: further values on its axes, further axes, further cases, further generations of a search.
 
 The cases of the old study are the same cases in the new one, so only new cases are run.
 """
@@ -14,7 +14,7 @@ from sprag_study.service.reading.texts import quantity_text
 from sprag_study.service.spec.axes.axes import AXIS, axis_values
 from sprag_study.service.spec.axes.design import ANYTHING
 from sprag_study.service.spec.derive import read_machine
-from sprag_study.service.spec.described import Listed, Record
+from sprag_study.service.spec.described import Described, Listed, Record
 from sprag_study.service.spec.document import ParsedSpec, parse_spec
 from sprag_study.service.spec.fields import renamed
 from sprag_study.service.spec.kinds.registry import without_cases
@@ -25,6 +25,7 @@ from sprag_study.service.spec.node import Node
 from sprag_study.service.spec.report import Report, SpecError
 from sprag_study.worker.directions import SWEEP
 from sprag_study.worker.limits import MAX_AXES
+from sprag_study.worker.planning.goals.plan import GENERATIONS, GOAL
 from sprag_study.worker.study import without_drives
 
 if TYPE_CHECKING:
@@ -34,24 +35,32 @@ _AXES: Final = (
     "further values of axes of a grid; a parameter that did not vary becomes an axis of the base's value and these"
 )
 _CASES: Final = "further cases, which come after those of the study; what they do not vary is as in the base"
+_GENERATIONS: Final = "further generations of a search with a goal, beyond those that it came to"
 #: What stands behind the name of an extended study.
 _SUFFIX: Final = ", extended"
 EXTENSION: Final = Record(
     {
         "axes": Listed("axes", 1, MAX_AXES, _AXES, item=AXIS),
         "cases": Listed("cases", 1, MAX_AXES, _CASES, item=ANYTHING),
+        "generations": Described("generations", "", _GENERATIONS, "whole", *GENERATIONS),
         "name": {"type": "string", "description": "name of the new study; by default that of the old one, extended"},
     },
-    "what is added to a study: either axes or cases",
+    "what is added to a study: either axes or cases, or generations",
 )
 
 
-def parse_extended(spec: Mapping[str, Any], study: Study, addition: object) -> ParsedSpec:
+def parse_extended(spec: Mapping[str, Any], study: Study, addition: object, came_to: int | None = None) -> ParsedSpec:
     """Check and return the study of `extended_spec`; pointers of faults in ``addition`` refer to ``addition``."""
     report = Report(addition)
     try:
-        made = parse_spec(extended_spec(spec, study, addition, report))
+        made = parse_spec(extended_spec(spec, study, addition, report, came_to))
     except SpecError as error:
+        if isinstance(addition, Mapping) and "generations" in addition:
+            moved = [
+                replace(fault, where=(fault.where or "").removeprefix("/goal").removesuffix("/population"))
+                for fault in error.faults
+            ]
+            raise SpecError(moved) from error
         if not (isinstance(addition, Mapping) and "cases" in addition):
             raise
         # The study itself is the first axis; additions follow.
@@ -71,7 +80,11 @@ def _moved(fault: Fault, before: int) -> Fault:
 
 
 def extended_spec(
-    spec: Mapping[str, Any], study: Study, addition: object, report: Report | None = None
+    spec: Mapping[str, Any],
+    study: Study,
+    addition: object,
+    report: Report | None = None,
+    came_to: int | None = None,
 ) -> dict[str, Any]:
     """The spec of a study with the cases of ``study`` and those of ``addition``.
 
@@ -80,8 +93,9 @@ def extended_spec(
     spec : the study's own spec
     study : the same in SI numbers
     addition : plain JSON data: ``axes``, values for old or new axes of a grid; or ``cases``, axes, samples, points and
-        groups as in a spec, whose cases come after those of the study; and a ``name``
+        groups as in a spec, whose cases come after those of the study; or ``generations`` of a search; and a ``name``
     report : where faults of ``addition``, and warnings about further values, are recorded
+    came_to : generations that the search came to; by default those of its goal
 
     Raises
     ------
@@ -89,10 +103,13 @@ def extended_spec(
         With every fault of ``addition``; pointers refer to it.
     """
     root = Node(Report(addition) if report is None else report, "", addition)
+    name = root["name"].otherwise(renamed(study.name, _SUFFIX)).value
+    if "generations" in root:
+        return {**_longer(root, spec, study, came_to), "name": name}
     items, field = _read_addition(root, study)
     # The tolerances stay: every further place is run with the same drives.
     kept = without_cases(spec, SPREAD)
-    kept["name"] = root["name"].otherwise(renamed(study.name, _SUFFIX)).value
+    kept["name"] = name
     places = without_drives(study)
     own: list[dict[str, Any]] = [
         {
@@ -114,6 +131,24 @@ def extended_spec(
         _add(item, places, own)
     root.report.raise_if_any()
     return {**kept, "combine": "grid", "axes": own}
+
+
+def _longer(root: Node, spec: Mapping[str, Any], study: Study, came_to: int | None) -> dict[str, Any]:
+    """The spec of a search with further generations: those of before have the same designs."""
+    EXTENSION.read(root)
+    further = EXTENSION.described["generations"].read(root)
+    given = [name for name in ("axes", "cases", "generations") if name in root]
+    if len(given) != 1:
+        root.refuse("exactly-one", "needs one of `axes`, `cases` and `generations`", given, allowed="one of them")
+    elif study.plan is None or study.plan["kind"] != GOAL:
+        root["generations"].refuse("conflict", "the study is no search", further, allowed="a study with `goal`")
+    root.report.raise_if_any()
+    assert study.plan is not None
+    most = int(study.plan["generations"])
+    reached = most if came_to is None else came_to
+    # A search that ended by itself would end there again.
+    end = {"least_gain": 0} if reached < most else {}
+    return {**spec, "goal": {**spec["goal"], "generations": reached + further, **end}}
 
 
 def _read_addition(root: Node, study: Study) -> tuple[list[Node], str]:

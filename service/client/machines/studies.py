@@ -61,6 +61,7 @@ class Studies(Draft):
         population: int | None = None,
         generations: int | None = None,
         seed: int | None = None,
+        least_gain: Quantity | None = None,
         polish: bool | None = None,
     ) -> Self:
         """What a design should reach, and what may vary for it.
@@ -86,8 +87,11 @@ class Studies(Draft):
             Generations, each chosen from the ones before.
         seed : int, optional
             Seed of the random numbers.
+        least_gain : number or text with a unit, optional
+            A search for one goal ends where starting anew has bettered the goal by at most this share; 0: after all
+            generations: 0 % to 100 %.
         polish : bool, optional
-            Whether equalities are met exactly at the end.
+            Whether equalities are met exactly at the end, and one goal is brought to its optimum by derivatives.
         """
         return self._choosing(
             goal=known(
@@ -100,6 +104,7 @@ class Studies(Draft):
                 population=population,
                 generations=generations,
                 seed=seed,
+                least_gain=least_gain,
                 polish=polish,
             )
         )

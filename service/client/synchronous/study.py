@@ -71,14 +71,16 @@ class Study(StudyViews, StudyTables, Shown):
         axes: Sequence[Mapping[str, Any]] | None = None,
         *,
         cases: Sequence[Mapping[str, Any]] | None = None,
+        generations: int | None = None,
         name: str | None = None,
         key: str | None = None,
     ) -> Study:
         """Submit a study with this one's cases and more, of which only the new ones are run.
 
-        The same ``key`` submits it once, however often it is sent.
+        ``generations`` are further ones of a search with a goal, beyond those that it came to. The same ``key`` submits
+        it once, however often it is sent.
         """
-        return self._further("extend", key, json=extension(axes, cases, name))
+        return self._further("extend", key, json=extension(axes, cases, generations, name))
 
     def run_longer(self, regime: str | None = None, at_most: int | None = None, *, key: str | None = None) -> Study:
         """Submit a study of this one's unsettled cases, with more excitation periods for each.

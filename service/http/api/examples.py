@@ -67,4 +67,5 @@ CLUTCH_FIT: Final[dict[str, Any]] = {
 }
 
 EXTENSION_AXES: Final = {"axes": [{"path": "shaft.load", "values": [0.5, "0.7 N*m"]}]}
+EXTENSION_GENERATIONS: Final = {"generations": 40}
 EXTENSION_CASES: Final = {"cases": [{"points": "excitation.frequency [rpm],shaft.load\n1500,0.9\n"}]}

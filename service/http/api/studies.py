@@ -219,7 +219,11 @@ def retry_study(
     "/studies/{study_id:study}:extend",
     **submits(*_SPEC_PROBLEMS, "study-not-found"),
     openapi_extra=body(
-        {"further loads": examples.EXTENSION_AXES, "further cases": examples.EXTENSION_CASES},
+        {
+            "further loads": examples.EXTENSION_AXES,
+            "further cases": examples.EXTENSION_CASES,
+            "further generations": examples.EXTENSION_GENERATIONS,
+        },
         "Extension",
     ),
 )
@@ -232,7 +236,7 @@ async def extend_study(
     priority: Priority = 0,
     finish_by: FinishBy = None,
 ) -> Response:
-    """Submit a study with more values on the axes of an old one, or more cases; only new cases are run.
+    """Submit a study with more values on the axes of an old one, more cases or more generations; only new cases run.
 
     Where none is new, and no name is given, the answer is the old study.
     """

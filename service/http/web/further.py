@@ -83,7 +83,7 @@ def _wrong(values: Values, faults: Sequence[Fault]) -> Faults:
         if part == "axes" and place.isdigit() and int(place) < len(axes):
             field = f"axis:{axes[int(place)]['path']}"
         else:
-            field = {"cases": "points", "points": "points", "name": "name"}.get(part, "")
+            field = {"cases": "points", "points": "points", "name": "name", "generations": "generations"}.get(part, "")
         found.setdefault(field, []).append(message(fault))
     return found
 
@@ -105,7 +105,11 @@ def _doubts(values: Values) -> list[WarningText]:
 
 
 def _addition(values: Values) -> dict[str, Any]:
-    """The extension that the form describes; FaultError unless it is either of values or of cases."""
+    """The extension that the form describes; FaultError unless it is of values, of cases or of generations."""
+    if "generations" in values:
+        text = values["generations"].strip()
+        number = parse_number(text)
+        return {"generations": text if number is None else int(number) if number == int(number) else number}
     axes = _axes(values)
     points = values.get("points", "").strip()
     if bool(axes) == bool(points):

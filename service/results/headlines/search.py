@@ -45,15 +45,22 @@ def search_headline(found: Designs, *, over: bool) -> Headline:
     if not len(found.numbers):
         return Headline()
     best, goals = int(found.order[0]), found.plan.best
-    feasible = bool(found.front.feasible[best])
     return Headline(
-        sentence=tuple(filter(None, (_best(found, best), _converged(found, over=over) if feasible else NOTHING))),
+        sentence=tuple(filter(None, _sentences(found, best, over=over))),
         numbers=tuple(_goal(found, best, place) for place in range(len(goals)))[:MOST],
         dimensions=tuple(_dimensions(found, best)),
         limits=tuple(_limit(found, best, limit) for limit in found.plan.subject_to),
         trace=_trace(found),
         case=int(found.front.cases[best, 0]),
     )
+
+
+def _sentences(found: Designs, best: int, *, over: bool) -> Iterator[Phrase]:
+    """The best value; of one goal also whether the search has converged, and which limits bind."""
+    yield _best(found, best)
+    if found.front.feasible[best] and len(found.plan.best) == 1:
+        yield converged(found, over=over)
+        yield _binding(found, best)
 
 
 def _best(found: Designs, best: int) -> Phrase:
@@ -144,11 +151,10 @@ def _limit(found: Designs, best: int, limit: Limit) -> KeyNumber:
         note = Phrase("as required") if met else Phrase("required: {value}", value=text)
         return KeyNumber(limit.name, str(term(own)) if isinstance(own, str) else own, info.unit, note=note, case=case)
     place = int(worst_places(limit, values[np.newaxis])[0])
-    value = float(values[place])
-    off = value - limit.value
-    reserve = {"is": limit.within - abs(off), "at_least": off, "at_most": -off}[limit.kind]
+    value, reserve = float(values[place]), reserve_of(found, best, limit)
+    assert reserve is not None
     unit, bound = info.unit, _amount(found, limit.name, limit.value)
-    note = _reserve(limit, bound, reserve / limit.scale)
+    note = _reserve(limit, bound, reserve)
     where = Phrase("at {place}", place=_point(found, place)) if len(found.plan.at) > 1 else NOTHING
     return KeyNumber(limit.name, value, unit, digits(value), where=where, note=note, case=case)
 
@@ -177,32 +183,95 @@ def _percent(share: float) -> Amount:
 
 
 def _bests(found: Designs) -> list[float]:
-    """The best value of the first goal that each generation knew, from the first that has one."""
+    """The best value of the first goal that was known before each round, from the first that has one."""
     known = [one.get("best") or [None] for one in history(found.rounds)]
     return [float(values[0]) for values in known if values and values[0] is not None]
 
 
-def _converged(found: Designs, *, over: bool) -> Phrase:
-    """Whether more generations would help."""
-    bests = _bests(found)
-    if len(bests) < _LEAST or len(found.plan.best) > 1:
+def _generations(found: Designs) -> dict[int, float]:
+    """The best value of the first goal after each generation: as the search knew it, without polish and finish."""
+    bests: dict[int, float] = {}
+    for one in history(found.rounds):
+        values = one.get("best") or [None]
+        if one["generation"] and values[0] is not None:
+            bests.setdefault(one["generation"], float(values[0]))
+    return bests
+
+
+def unimproved(found: Designs) -> int:
+    """How many of the last generations bettered the best value by less than 0.1 % together."""
+    bests = _generations(found)
+    if not bests:
+        return 0
+    last = max(bests)
+    worse = [number for number, value in bests.items() if abs(value - bests[last]) > _BETTER * abs(bests[last])]
+    return last - min(number for number in bests if number > max(worse, default=0))
+
+
+def converged(found: Designs, *, over: bool) -> Phrase:
+    """Whether more generations would help, of a search for one goal; ``over``: it runs no further."""
+    bests = _generations(found)
+    if len(bests) < _LEAST:
         return NOTHING
-    last = bests[-1]
-    same = 0
-    for value in reversed(bests[:-1]):
-        if abs(value - last) > _BETTER * abs(last):
-            break
-        same += 1
-    enough = max(_LEAST, round(_WITHOUT * found.plan.generations))
-    if same >= enough:
+    if over and found.plan.least_gain and max(bests) < found.plan.generations and _ended(found):
+        return Phrase(
+            "The search has converged after {generations} of at most {most} generations: starting anew bettered the "
+            "goal by at most {share} %.",
+            generations=str(max(bests)), most=str(found.plan.generations), share=_percent(found.plan.least_gain),
+        )  # fmt: skip
+    same = unimproved(found)
+    if same >= max(_LEAST, round(_WITHOUT * found.plan.generations)):
         return plural(
-            "It has not become better for {count} generation.",
-            "It has not become better for {count} generations.",
-            same,
-        )
+            "The search has converged: the last generation bettered the goal by less than {share} %.",
+            "The search has converged: the last {count} generations bettered the goal by less than {share} %.",
+            same, share=_percent(_BETTER),
+        )  # fmt: skip
     if not over:
         return NOTHING
-    return Phrase("It was still becoming better at the end: more generations may find a better one.")
+    if found.rounds[-1].summary.get("finish"):
+        return Phrase(
+            "The search has not converged: its best design was brought to the optimum beside it, and more generations "
+            "may come to another one."
+        )
+    return Phrase("The search has not converged: it was still becoming better, and more generations would help.")
+
+
+def _ended(found: Designs) -> bool:
+    """Whether the search itself came to its end, and was not cancelled."""
+    return any(record.summary.get("phase") == "ended" for record in found.rounds)
+
+
+def _binding(found: Designs, best: int) -> Phrase:
+    """Which limits bind, or the one that is nearest to it."""
+    reserves = [
+        (share, limit)
+        for limit in found.plan.subject_to
+        if limit.kind != "is" and (share := reserve_of(found, best, limit)) is not None
+    ]
+    if not reserves:
+        return NOTHING
+    bound = joined(", ", (_named(limit) for share, limit in reserves if share < _NONE))
+    if bound:
+        return Phrase("At the limit: {names}.", names=bound)
+    share, limit = min(reserves, key=lambda one: one[0])
+    return Phrase(
+        "No limit binds: the nearest is that of {name}, with {share} % in reserve.",
+        name=_named(limit), share=_percent(share),
+    )  # fmt: skip
+
+
+def _named(limit: Limit) -> Phrase | Name:
+    """What a limit is about, within a sentence."""
+    return Phrase("the yield") if limit.conditions else Name(limit.name, within=True)
+
+
+def reserve_of(found: Designs, best: int, limit: Limit) -> float | None:
+    """What is left to a limit at its worst operating point, as a share of it; None for a category or a count."""
+    if found.infos[limit.name].kind != "real":
+        return None
+    values = found.values[limit.name][best]
+    off = float(values[int(worst_places(limit, values[np.newaxis])[0])]) - limit.value
+    return {"is": limit.within - abs(off), "at_least": off, "at_most": -off}[limit.kind] / limit.scale
 
 
 def _trace(found: Designs) -> Trace | None:

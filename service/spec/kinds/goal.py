@@ -100,7 +100,16 @@ GOAL: Final = Record(
             "generations", "Generations", "generations, each chosen from the ones before", "whole", 1, 10_000, 60
         ),
         "seed": Described("seed", "Seed", "seed of the random numbers", "whole", 0, 2**32 - 1, 1),
-        "polish": Described("polish", "", "whether equalities are met exactly at the end", "flag", default=True),
+        "least_gain": Described(
+            "least_gain", "Least gain",
+            "a search for one goal ends where starting anew has bettered the goal by at most this share; 0: after all "
+            "generations", "text", default="0.1 %", limits="0 % to 100 %",
+        ),
+        "polish": Described(
+            "polish", "",
+            "whether equalities are met exactly at the end, and one goal is brought to its optimum by derivatives",
+            "flag", default=True,
+        ),
     },
     "what a design should reach, and what may vary for it",
     required=("vary",),
@@ -210,6 +219,7 @@ def read_goal(
     read = [_read_constraint(item, robust=True) for item in GOAL.items(goal, "subject_to")]
     constraints = [constraint for constraint in read if constraint]
     search = GOAL.values(goal)
+    least_gain = goal["least_gain"].otherwise(GOAL.described["least_gain"].default).share(0.0, 1.0)
     if goal.sound and not best and not constraints:
         goal.refuse("empty", "asks for nothing", None, allowed="`best` or `subject_to`, or both")
     if goal.sound:
@@ -228,7 +238,18 @@ def read_goal(
     if start is None:
         return None
     plan = {"kind": "goal", "vary": variables, "best": best, "subject_to": constraints, "at": points, **search}
-    return plan | ({"drives": drives} if drives else {}) | ({"start": start} if start else {})
+    del plan["least_gain"]
+    plan |= ({"drives": drives} if drives else {}) | ({"start": start} if start else {})
+    return plan | (_of_one_goal(search["polish"], least_gain or 0.0) if len(best) == 1 else {})
+
+
+def _of_one_goal(polish: bool, least_gain: float) -> dict[str, Any]:
+    """What the search for one goal does beyond that of earlier releases, whose plans go on as they began."""
+    return {
+        "growing": True,
+        **({"finish": True} if polish else {}),
+        **({"least_gain": least_gain} if least_gain else {}),
+    }
 
 
 def read_start(goal: Node, variables: Variables, population: int) -> list[list[float]] | None:

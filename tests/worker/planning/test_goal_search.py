@@ -192,19 +192,19 @@ def test_the_hypervolume_counts_from_the_generation_of_which_half_is_within_the_
         return Scores(filled, np.where(np.isnan(filled[:, 0]), 1.0, 0.0), filled, np.zeros(len(filled)))
 
     early = scores([(5.0, 0.1), (6.0, 0.05)])
-    record.generation(early, early)
+    record.generation(early, early, 1)
     assert record.summary("search")["hypervolume"] is None
     late = scores([(k, 10.0 - k) for k in range(10)])
-    record.generation(late, late)
+    record.generation(late, late, 2)
     summary = record.summary("search")
     assert summary["reference"] == [9.0, 10.0]
     # The early ones still dominate the strips to their right.
     assert summary["hypervolume"] == pytest.approx(sum(range(5)) + 9.9 + 3 * 9.95)
     best = scores([(k, 9.0 - k) for k in range(10)])
-    record.generation(best, best)
+    record.generation(best, best, 3)
     better = record.summary("search")["hypervolume"]
     assert better > summary["hypervolume"]
-    record.generation(late, late)  # survivors that dominate less
+    record.generation(late, late, 4)  # survivors that dominate less
     assert record.summary("search")["hypervolume"] == better
 
 

@@ -9,7 +9,8 @@ complexity", NIPS 2016). What this search adds:
   M. Hellwig and H.-G. Beyer, CEC 2018;
 - **catalogues**: a coordinate's deviation is kept so large that its next value is drawn with a probability of at least
   1 / (variables x population) (the margin of R. Hamano et al., GECCO 2022);
-- **restarts**: where the draws no longer differ, from a random place.
+- **restarts**: where the draws no longer differ, from a random place, with as many draws or with twice as many (IPOP:
+  A. Auger, N. Hansen, "A restart CMA evolution strategy with increasing population size", CEC 2005).
 """
 
 from __future__ import annotations
@@ -36,8 +37,9 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: First deviation, in widths of the ranges; the least one before a restart.
-_DEVIATION, _LEAST = 0.3, 1e-12
+#: First deviation, in widths of the ranges; the least one before a restart, and before one with more draws, from whose
+#: place the finish goes on.
+_DEVIATION, _LEAST, _SETTLED = 0.3, 1e-12, 1e-3
 #: Designs kept as the best.
 _KEPT = 20
 #: Random numbers of restarts are apart from those of generations.
@@ -74,14 +76,22 @@ class _Rates:
 class Cma:
     """The distribution so far, and how the next generation follows from it."""
 
-    def __init__(self, space: Space, population: int, seed: int) -> None:
-        self._space, self._population, self._seed = space, population, seed
-        self._rates = _Rates(space.dimensions, population)
-        self._quantile = normal_quantile(min(0.25, 1.0 / (space.dimensions * population)))
+    def __init__(self, space: Space, population: int, seed: int, *, growing: bool = False) -> None:
+        self._space, self._seed, self._growing = space, seed, growing
+        self._populate(population)
         self._tolerance = Tolerance()
         self._generation = 0
         self._best: tuple[Floats, Scores] | None = None
+        #: Violation and goal of the best design when the run began, and what the last run gained, relative.
+        self._begun: tuple[float, float] | None = None
+        self._gained = math.inf
         self._start(np.full(space.dimensions, 0.5))
+
+    def _populate(self, population: int) -> None:
+        """Begin with generations of that many designs."""
+        n = self._space.dimensions
+        self._population, self._rates = population, _Rates(n, population)
+        self._quantile = normal_quantile(min(0.25, 1.0 / (n * population)))
 
     def _start(self, mean: Floats) -> None:
         n = self._space.dimensions
@@ -102,7 +112,19 @@ class Cma:
         return self._space.centred(self._coordinates)
 
     def _restart(self, generation: int) -> None:
+        """End the run, and begin another one."""
+        best = None if self._best is None else (float(self._best[1].violation[0]), float(self._best[1].goals[0, 0]))
+        self._gained = math.inf
+        if self._begun is not None and best is not None and self._begun[0] == best[0] == 0.0:
+            self._gained = (self._begun[1] - best[1]) / max(abs(self._begun[1]), 1e-300)
+        self._begun = best
+        if self._growing:
+            self._populate(min(2 * self._population, POPULATION[1]))
         self._start(Draws(self._seed, _RESTARTS + generation).uniforms(self._space.dimensions))
+
+    def settled(self, least: float, /) -> bool:
+        """Whether a run that began anew has ended, and its best design is better by at most that share of the goal."""
+        return self._gained <= least
 
     def _draw(self, generation: int) -> None:
         self._normals = Draws(self._seed, generation).normals(self._population, self._space.dimensions)
@@ -204,7 +226,7 @@ class Cma:
         except ValueError:
             return True
         widest = self._deviation * math.sqrt(float(np.diag(self._covariance).max()))
-        if not _LEAST < widest < 1e3:
+        if not (_SETTLED if self._growing else _LEAST) < widest < 1e3:
             return True
         window = 10 + math.ceil(30 * self._space.dimensions / self._population)
         self._lasts = self._lasts[-window:]

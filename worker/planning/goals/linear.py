@@ -46,7 +46,11 @@ def solved(matrix: Floats, right: Floats) -> Floats:
     ValueError
         As of ``cholesky``.
     """
-    factor = cholesky(matrix)
+    return both_solved(cholesky(matrix), right)
+
+
+def both_solved(factor: Floats, right: Floats) -> Floats:
+    """The solution x, shape (n,), of the system L L'x = right with the lower triangular ``factor`` L."""
     x = lower_solved(factor, right)
     for j in reversed(range(len(x))):
         x[j] /= factor[j, j]
@@ -60,6 +64,11 @@ def weighted_sum(weights: Floats, rows: Floats) -> Floats:
     for weight, row in zip(weights.tolist(), rows, strict=True):
         total += weight * row
     return total
+
+
+def summed(rows: Floats) -> Floats:
+    """The sum of ``rows``, shape (k, ...) with at least one row, in their order: each adds to the sum before."""
+    return np.asarray(np.add.accumulate(rows, axis=0)[-1])
 
 
 def norm(vector: Floats) -> float:

@@ -78,6 +78,10 @@ class Nsga2:
         self._parents = self._chosen(self._parents, coordinates, scores, epsilon) if epsilon > 0.0 else best
         self._best = best
 
+    def settled(self, _least: float, /) -> bool:
+        """Never: how far a front can still move is not known."""
+        return False
+
     def survivors(self) -> tuple[Floats, Scores]:
         """The best designs so far, the first fronts first, those with far neighbours first within a front."""
         assert self._best is not None

@@ -168,6 +168,14 @@ class GoalPlan:
     population, generations, seed : int
     polish : bool
         Whether equalities are met to 1e-6 by further rounds after the last generation.
+    finish : bool
+        Whether the best design of a search for one goal is moved to the optimum beside it after that.
+    growing : bool
+        Whether a search for one goal that starts anew has generations of twice as many designs each time; one of k
+        times the population counts as k of ``generations``.
+    least_gain : float
+        Share of the goal, 0 to 1: a search for one goal ends where starting anew has gained no more; 0: at its last
+        generation.
     drives : int
         Drawn drives of each design at each operating point, beside the nominal one; 0 without tolerances.
     start : tuple of tuple of float
@@ -190,6 +198,9 @@ class GoalPlan:
     polish: bool = True
     drives: int = 0
     start: tuple[tuple[float, ...], ...] = ()
+    finish: bool = False
+    growing: bool = False
+    least_gain: float = 0.0
 
     def __post_init__(self) -> None:
         _check_variables(self)
@@ -208,6 +219,7 @@ class GoalPlan:
             ("drives", self.drives, (0, MAX_DRIVES)),
         ):
             _check(low <= value <= high, name, value, f"an integer from {low:,} to {high:,}")
+        _check(0.0 <= self.least_gain <= 1.0, "least_gain", self.least_gain, "a share from 0 to 1")
         designs = self.population * self.generations
         _check(designs <= MOST_DESIGNS, "population", designs, f"at most {MOST_DESIGNS:,} times generations")
 
@@ -260,6 +272,9 @@ class GoalPlan:
                 polish=bool(data.get("polish", True)),
                 drives=int(data.get("drives", 0)),
                 start=tuple(tuple(float(value) for value in one) for one in data.get("start", ())),
+                finish=bool(data.get("finish", False)),
+                growing=bool(data.get("growing", False)),
+                least_gain=float(data.get("least_gain", 0.0)),
             )
         except KeyError as error:
             raise ValueError(f"goal: {error.args[0]} is missing") from error
@@ -285,6 +300,9 @@ class GoalPlan:
             "polish": self.polish,
             **({"drives": self.drives} if self.drives else {}),
             **({"start": [list(one) for one in self.start]} if self.start else {}),
+            **({"finish": True} if self.finish else {}),
+            **({"growing": True} if self.growing else {}),
+            **({"least_gain": self.least_gain} if self.least_gain else {}),
         }
 
 

@@ -1,4 +1,4 @@
-"""The planner of a search for designs: generations, then the polish of equalities."""
+"""The planner of a search for designs: generations, the polish of equalities, the finish of one goal."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag_study.worker.planning.goals.cma import Cma
+from sprag_study.worker.planning.goals.finish import Finish, finish_designs, finish_rounds
 from sprag_study.worker.planning.goals.nsga2 import Nsga2
-from sprag_study.worker.planning.goals.polish import MOST_STARTS, MOST_TRIALS, Polish, polish_designs
+from sprag_study.worker.planning.goals.polish import MET, MOST_STARTS, MOST_TRIALS, Polish, polish_designs
+from sprag_study.worker.planning.goals.ranking import ranks
 from sprag_study.worker.planning.goals.record import Record
 from sprag_study.worker.planning.goals.scores import Scores, judge, outputs_of
 from sprag_study.worker.planning.goals.space import Space, keys
@@ -38,15 +40,36 @@ class Search(Protocol):
     def survivors(self) -> tuple[Floats, Scores]:
         """The best designs so far, coordinates and scores."""
 
+    def settled(self, least: float, /) -> bool:
+        """Whether a search that began anew has gained at most that share of its goal, so that it may end."""
+
+
+class End(Protocol):
+    """What follows the generations: the polish, then the finish."""
+
+    @property
+    def done(self) -> bool:
+        """Whether nothing is left to try."""
+
+    @property
+    def differentiates(self) -> bool:
+        """Whether the designs of this round serve the derivatives only."""
+
+    def propose(self) -> Floats:
+        """Coordinates of the next designs, shape (designs, dimensions)."""
+
+    def take(self, outputs: Floats) -> None:
+        """Go on by the outputs of the designs proposed last."""
+
 
 class GoalPlanner:
     """Searches for the best designs (`sprag_study.worker.planning.rounds.Planner`).
 
-    One goal is searched for by CMA-ES, several or none by NSGA-II; then equalities are polished.
+    One goal is searched for by CMA-ES, several or none by NSGA-II; then equalities are polished, and one goal finished.
 
-    A round is a generation, without the designs that were evaluated before, or a step of the polish. Columns of the
-    points are the variables of the plan in their order, then the paths of its operating points, then the drive; the
-    cases of a design, one for each operating point and drive, are stored next to each other.
+    A round is a generation, without the designs that were evaluated before, or a step of the polish or of the finish.
+    Columns of the points are the variables of the plan in their order, then the paths of its operating points, then the
+    drive; the cases of a design, one for each operating point and drive, are stored next to each other.
     """
 
     def __init__(self, plan: GoalPlan) -> None:
@@ -54,13 +77,15 @@ class GoalPlanner:
         self._space = Space(plan)
         self._search: Search
         if len(plan.best) == 1:
-            self._search = Cma(self._space, plan.population, plan.seed)
+            self._search = Cma(self._space, plan.population, plan.seed, growing=plan.growing)
         else:
             self._search = Nsga2(self._space, plan.population, plan.seed)
         self._known: dict[bytes, Floats] = {}
         self._record = Record(plan)
-        self._generation = self._idle = self._rounds = self._cases = 0
-        self._polish: Polish | None = None
+        self._generation = self._idle = self._rounds = self._cases = self._spent = 0
+        self._end: End | None = None
+        #: Known designs that served derivatives only.
+        self._aside: set[bytes] = set()
         self._proposed = np.empty((0, self._space.dimensions))
         self._keys: list[bytes] = []
         #: Of the proposed designs, those that are not known: their places, and they themselves.
@@ -80,14 +105,15 @@ class GoalPlanner:
 
     @property
     def most_cases(self) -> int:
-        """Cases of a search in which no design comes twice, with the longest polish."""
-        return (self._most_searched + polish_designs(self.plan)) * self.plan.cases_each
+        """Cases of a search in which no design comes twice, with the longest polish and the longest finish."""
+        ends = polish_designs(self.plan) + finish_designs(self.plan)
+        return (self._most_searched + ends) * self.plan.cases_each
 
     @property
     def most_rounds(self) -> int:
-        """Generations, each with a new design, and the rounds of the polish."""
+        """Generations, each with a new design, and the rounds of the polish and of the finish."""
         generations = min(self.plan.generations, self._most_searched)
-        return generations + (1 + MOST_TRIALS if polish_designs(self.plan) else 0)
+        return generations + (1 + MOST_TRIALS if polish_designs(self.plan) else 0) + finish_rounds(self.plan)
 
     @property
     def _most_searched(self) -> int:
@@ -118,7 +144,10 @@ class GoalPlanner:
 
     def ask(self) -> Step:
         """The next round; asking changes nothing."""
-        return Step(self._space.cases(self._asked), self._record.summary(self._phase()))
+        derivatives = self._end is not None and self._end.differentiates and len(self._asked) > 0
+        finishing = isinstance(self._end, Finish)
+        summary = self._record.summary(self._phase(), derivatives=derivatives, finishing=finishing)
+        return Step(self._space.cases(self._asked), summary)
 
     def best(self) -> tuple[Floats, Scores]:
         """The best designs of the search so far, the survivors of its last generation: variables in SI and scores."""
@@ -128,20 +157,22 @@ class GoalPlanner:
     def _phase(self) -> str:
         if not len(self._asked):
             return "ended"
-        return "search" if self._polish is None else "polish"
+        return "search" if self._end is None else "polish"
 
     def _settle(self) -> None:
-        """Hand the outputs of what was proposed to the search or to the polish."""
+        """Hand the outputs of what was proposed to the search, or to the polish or the finish."""
         if not self._keys:
             scores = self._search.survivors()[1][:0]
         else:
             scores = judge(self.plan, np.array([self._known[key] for key in self._keys]))
-        if self._polish is not None:
-            if self._polish.differentiates:
-                self._record.differentiated(scores[self._new])
+        if self._end is not None:
+            finishing = isinstance(self._end, Finish)
+            if self._end.differentiates:
+                self._aside.update(self._keys[place] for place in self._new.tolist())
+                self._record.differentiated(scores[self._new], finishing=finishing)
             else:
-                self._record.polished(scores[self._new])
-            self._polish.take(scores.outputs)
+                self._record.polished(scores[self._new], finishing=finishing)
+            self._end.take(scores.outputs)
             return
         if len(scores):
             self._search.take(self._proposed, scores)
@@ -150,30 +181,33 @@ class GoalPlanner:
 
     def _others(self, coordinates: Floats, scores: Scores) -> None:
         """Take designs that another planner asked for: as a generation, or beside the polish, which asks again."""
-        if self._polish is not None or not len(self._asked):
-            self._record.polished(scores)
+        if self._end is not None or not len(self._asked):
+            self._record.polished(scores, finishing=isinstance(self._end, Finish))
             return
         self._search.take(coordinates, scores)
         self._generated(scores)
 
     def _generated(self, new: Scores) -> None:
         self._generation += 1
-        self._record.generation(new, self._search.survivors()[1])
+        self._spent += len(self._proposed) if self.plan.growing else self.plan.population
+        self._record.generation(new, self._search.survivors()[1], -(-self._spent // self.plan.population))
 
     def _next(self) -> None:
         """Propose until there is something new to ask for, or the end."""
         while True:
-            searching = self._generation < self.plan.generations and self._idle < _IDLE
+            left = self.plan.population * self.plan.generations - self._spent
+            settled = self.plan.least_gain > 0.0 and self._search.settled(self.plan.least_gain)
+            searching = left > 0 and self._idle < _IDLE and not settled
             if self._rounds >= self.most_rounds:
                 self._propose(self._proposed[:0])
                 return
             if searching and len(self._known) != self._space.size:
-                self._propose(self._begun_with(self._search.propose(self._generation, self._known)))
-            elif self._polish_begun().done:
+                self._propose(self._begun_with(self._search.propose(self._generation, self._known))[:left])
+            elif self._end_begun().done:
                 self._propose(self._proposed[:0])
                 return
             else:
-                self._propose(self._polish_begun().propose())
+                self._propose(self._end_begun().propose())
             if self._cases + len(self._asked) * self.plan.cases_each > self.most_cases:
                 self._propose(self._proposed[:0])
                 return
@@ -194,10 +228,23 @@ class GoalPlanner:
         self._new = np.array(sorted(new.values()), dtype=np.int64)
         self._asked = designs[self._new]
 
-    def _polish_begun(self) -> Polish:
-        """The polish; it starts with the best designs of the search."""
-        if self._polish is None:
+    def _end_begun(self) -> End:
+        """The polish, which starts with the best designs of the search, and where it is done the finish."""
+        if self._end is None:
             places, scores = self._search.survivors()
             count = MOST_STARTS if polish_designs(self.plan) else 0
-            self._polish = Polish(self.plan, self._space, places[:count], scores.outputs[:count])
-        return self._polish
+            self._end = Polish(self.plan, self._space, places[:count], scores.outputs[:count])
+        if self._end.done and not isinstance(self._end, Finish) and finish_designs(self.plan):
+            self._end = self._finish()
+        return self._end
+
+    def _finish(self) -> Finish:
+        """The finish of the best design known: one whose equalities are met to 1e-6 where there is one."""
+        known = [(key, outputs) for key, outputs in self._known.items() if key not in self._aside]
+        outputs = np.array([own for _, own in known])
+        scores = judge(self.plan, outputs, equality=MET)
+        exact = bool(scores.feasible.any())
+        best = int(ranks(scores if exact else judge(self.plan, outputs)).argmin())
+        design = np.frombuffer(known[best][0], dtype=np.float64)[None]
+        place = self._space.coordinates(self._space.cases(design))[1][0]
+        return Finish(self.plan, self._space, place, outputs[best], exact=exact)

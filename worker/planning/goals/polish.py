@@ -163,7 +163,7 @@ class Polish:
         equal, excess = self._residuals.of(start.outputs)
         equal_rows, excess_rows = self._residuals.derivatives(start.derivatives)
         first = len(self._plan.at) * len(self._plan.subject_to)
-        goals = start.derivatives[first:-1]
+        goals = start.derivatives[first : first + len(self._plan.best)]
         goals = goals / np.array([norm(row) or 1.0 for row in goals]).reshape(-1, 1)
         held = excess > 0.0
         step = np.zeros(len(self._free))

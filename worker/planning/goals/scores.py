@@ -76,14 +76,28 @@ def outputs_of(plan: GoalPlan, rows: Rows) -> Floats:
     """What designs are judged by, shape (designs, limits x points + goals + 1).
 
     The columns are what each limit is about at each operating point, with half widths counted against it, the goals
-    taken over the operating points, and 1 where a case has failed or had not settled (of drawn drives: all of them),
-    otherwise 0. Values that are missing or not finite are NaN.
+    taken over the operating points, where a finish needs them (``goals_at``) the goal at each of these, and 1 where a
+    case has failed or had not settled (of drawn drives: all of them), otherwise 0. Values that are missing or not
+    finite are NaN.
     """
     table = Table(plan, rows)
     goals = [_over_points(plan.over, table.values(goal), goal.max) for goal in plan.best]
     columns = [table.values(limit, limit) for limit in plan.subject_to]
-    columns += [one[:, None] for one in (*goals, table.failed.astype(np.float64))]
-    return np.hstack(columns)
+    columns += [one[:, None] for one in goals]
+    columns += [table.values(goal) for goal in plan.best if _at_points(plan)]
+    return np.hstack([*columns, table.failed.astype(np.float64)[:, None]])
+
+
+def _at_points(plan: GoalPlan) -> bool:
+    """Whether outputs have the goal at each operating point, too: a worst one has no derivatives where two meet."""
+    return plan.finish and len(plan.best) == 1 and plan.over == "worst" and len(plan.at) > 1
+
+
+def goals_at(plan: GoalPlan, outputs: Floats) -> Floats:
+    """The values of which the largest is the goal, to be minimised; of one goal, shape (designs, values)."""
+    first = len(plan.at) * len(plan.subject_to)
+    columns = outputs[:, first + 1 : -1] if _at_points(plan) else outputs[:, first:-1]
+    return np.asarray(columns * signs(plan))
 
 
 def _over_points(over: str, values: Floats, largest: bool) -> Floats:
@@ -112,7 +126,7 @@ def judge(plan: GoalPlan, outputs: Floats, *, equality: float | None = None) -> 
     """
     points = len(plan.at)
     first = points * len(plan.subject_to)
-    goals = outputs[:, first:-1] * signs(plan) + 0.0
+    goals = outputs[:, first : first + len(plan.best)] * signs(plan) + 0.0
     violation, equalities = np.zeros(len(outputs)), np.zeros(len(outputs))
     for i, limit in enumerate(plan.subject_to):
         within = limit.within if equality is None or not limit.polished else equality * limit.scale
