@@ -56,13 +56,15 @@ def test_told_what_sprag_computes_it_is_the_search_of_a_study() -> None:
 
 
 def test_an_objective_of_the_script() -> None:
-    search = searched()
+    search, told = searched(), 0
     for designs in search:
         search.tell(cost(designs))
+        told += len(designs)
     best = search.best(1).iloc[0]
     np.testing.assert_allclose([best[FREQUENCY], best[ARM]], [27.0, 0.03], rtol=1e-3)
     assert search.done
-    assert repr(search) == "Search(cost: 320 designs told, ended)"
+    assert told <= 8 * 40 + 8 * (2 * 2 + 10), "generations and finish"
+    assert repr(search) == f"Search(cost: {told} designs told, ended)"
     assert (len(search.ask()), list(search)) == (0, [])
     with pytest.raises(ValueError, match="has ended"):
         search.tell([])
@@ -122,7 +124,7 @@ def test_goals_and_limits_of_both_kinds() -> None:
 
 @pytest.mark.parametrize("subject_to", [None, {"share": {"is": 0.25, "within": 0.01}}])
 def test_a_pickle_goes_on_bit_for_bit(subject_to: Any) -> None:
-    """Also with the polish of an equality, whose rounds follow from their derivatives."""
+    """Also with polish and finish, whose rounds follow from derivatives."""
 
     def told(search: sprag.Search) -> None:
         designs = search.ask()
@@ -136,9 +138,7 @@ def test_a_pickle_goes_on_bit_for_bit(subject_to: Any) -> None:
         pd.testing.assert_frame_equal(broken.ask(), straight.ask(), check_exact=True)
     assert copy.deepcopy(straight).done
     pd.testing.assert_frame_equal(broken.best(), straight.best(), check_exact=True)
-    assert [summary["phase"] for summary in straight._summaries].count("polish") == (
-        0 if subject_to is None else len(straight._told) - 6
-    )
+    assert [summary["phase"] for summary in straight._summaries].count("polish") == len(straight._told) - 6 > 0
     if subject_to is not None:
         assert abs(straight.best(1, exact=True)[ARM].item() - 0.03) < 1e-7
 

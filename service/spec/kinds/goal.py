@@ -218,7 +218,7 @@ def read_goal(
     best = _read_best(GOAL.items(goal, "best"))
     read = [_read_constraint(item, robust=True) for item in GOAL.items(goal, "subject_to")]
     constraints = [constraint for constraint in read if constraint]
-    search = GOAL.values(goal)
+    search = {name: field.read(goal) for name, field in GOAL.described.items() if name != "least_gain"}
     least_gain = goal["least_gain"].otherwise(GOAL.described["least_gain"].default).share(0.0, 1.0)
     if goal.sound and not best and not constraints:
         goal.refuse("empty", "asks for nothing", None, allowed="`best` or `subject_to`, or both")
@@ -238,7 +238,6 @@ def read_goal(
     if start is None:
         return None
     plan = {"kind": "goal", "vary": variables, "best": best, "subject_to": constraints, "at": points, **search}
-    del plan["least_gain"]
     plan |= ({"drives": drives} if drives else {}) | ({"start": start} if start else {})
     return plan | (_of_one_goal(search["polish"], least_gain or 0.0) if len(best) == 1 else {})
 

@@ -94,7 +94,9 @@ def refine_fields() -> dict[str, Field]:
 
 def search_fields() -> list[Field]:
     """The fields of a search that take one number each."""
-    return [described(goal.GOAL.described[name], "/goal") for name in ("population", "generations", "seed")]
+    return [
+        described(goal.GOAL.described[name], "/goal") for name in ("population", "generations", "seed", "least_gain")
+    ]
 
 
 def sample_field() -> Field:

@@ -49,6 +49,7 @@ GOAL_DEFAULTS: Final[Values] = {
     "/goal/best/0/toward": "max",
     "/goal/population": GOAL.described["population"].default_text,
     "/goal/generations": GOAL.described["generations"].default_text,
+    "/goal/least_gain": GOAL.described["least_gain"].default_text,
     "/goal/over": "worst",
     "/goal/polish": "on",
 }

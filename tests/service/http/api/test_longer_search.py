@@ -66,7 +66,7 @@ def test_what_is_wrong_is_named(service: Service) -> None:
     for study, addition, pointer, code in (
         (study_id, {"generations": 0}, "/generations", "out-of-range"),
         (study_id, {"generations": 10_000}, "/generations", "out-of-range"),
-        (study_id, {"generations": "many"}, "/generations", "not-a-number"),
+        (study_id, {"generations": "many"}, "/generations", "wrong-type"),
         (study_id, {"generations": 3, "axes": []}, "", "exactly-one"),
         (grid, {"generations": 3}, "/generations", "conflict"),
     ):

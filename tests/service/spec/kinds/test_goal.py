@@ -72,6 +72,24 @@ def test_a_goal_is_read_in_si() -> None:
     }
 
 
+@pytest.mark.parametrize(
+    ("fields", "plan"),
+    [
+        ({}, {"growing": True, "finish": True, "least_gain": 0.001}),
+        ({"polish": False, "least_gain": "2 %"}, {"growing": True, "least_gain": 0.02}),
+        ({"least_gain": 0}, {"growing": True, "finish": True}),
+    ],
+)
+def test_a_search_for_one_goal_says_how_it_ends(fields: dict[str, Any], plan: dict[str, Any]) -> None:
+    read_plan, report = read({"best": [{"result": "efficiency", "max": True}], **fields})
+    assert not report.faults
+    assert read_plan is not None
+    new = ("growing", "finish", "least_gain")
+    assert {name: read_plan[name] for name in new if name in read_plan} == plan
+    again = GoalPlan.from_json(read_plan).to_json()
+    assert {name: again[name] for name in new if name in again} == plan
+
+
 ARM, SPRING = "pendulums.0.arm", "pendulums.0.spring_rate"
 
 
@@ -126,6 +144,8 @@ def test_a_known_design_is_one_of_the_search(changes: dict[str, Any], pointer: s
         ({"best": [{"result": "efficiency", "max": 1}]}, "/goal/best/0/max", "wrong-type"),
         ({"best": GOAL["best"][:1] * 2}, "/goal/best/1/result", "repeated"),
         ({"best": [], "subject_to": []}, "/goal", "empty"),
+        ({"least_gain": "101 %"}, "/goal/least_gain", "out-of-range"),
+        ({"least_gain": "little"}, "/goal/least_gain", "not-a-number"),
         ({"subject_to": [{"result": "torque.max"}]}, "/goal/subject_to/0", "exactly-one"),
         ({"subject_to": [{"result": "torque.max", "at_most": "5 m"}]}, "/goal/subject_to/0/at_most", "wrong-unit"),
         ({"subject_to": [{"result": "regime", "at_most": 1}]}, "/goal/subject_to/0/at_most", "not-numeric"),
