@@ -37,9 +37,8 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: First deviation, in widths of the ranges; the least one before a restart, and before one with more draws, from whose
-#: place the finish goes on.
-_DEVIATION, _LEAST, _SETTLED = 0.3, 1e-12, 1e-3
+#: First deviation, in widths of the ranges; the least one before a restart, and where a finish does the rest.
+_DEVIATION, LEAST, LEAST_BEFORE_FINISH = 0.3, 1e-12, 1e-3
 #: Designs kept as the best.
 _KEPT = 20
 #: Random numbers of restarts are apart from those of generations.
@@ -76,8 +75,10 @@ class _Rates:
 class Cma:
     """The distribution so far, and how the next generation follows from it."""
 
-    def __init__(self, space: Space, population: int, seed: int, *, growing: bool = False) -> None:
-        self._space, self._seed, self._growing = space, seed, growing
+    def __init__(
+        self, space: Space, population: int, seed: int, *, growing: bool = False, least: float = LEAST
+    ) -> None:
+        self._space, self._seed, self._growing, self._least = space, seed, growing, least
         self._populate(population)
         self._tolerance = Tolerance()
         self._generation = 0
@@ -226,7 +227,7 @@ class Cma:
         except ValueError:
             return True
         widest = self._deviation * math.sqrt(float(np.diag(self._covariance).max()))
-        if not (_SETTLED if self._growing else _LEAST) < widest < 1e3:
+        if not self._least < widest < 1e3:
             return True
         window = 10 + math.ceil(30 * self._space.dimensions / self._population)
         self._lasts = self._lasts[-window:]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag_study.worker.planning.goals.cma import Cma
+from sprag_study.worker.planning.goals.cma import LEAST, LEAST_BEFORE_FINISH, Cma
 from sprag_study.worker.planning.goals.finish import Finish, finish_designs, finish_rounds
 from sprag_study.worker.planning.goals.nsga2 import Nsga2
 from sprag_study.worker.planning.goals.polish import MET, MOST_STARTS, MOST_TRIALS, Polish, polish_designs
@@ -77,7 +77,8 @@ class GoalPlanner:
         self._space = Space(plan)
         self._search: Search
         if len(plan.best) == 1:
-            self._search = Cma(self._space, plan.population, plan.seed, growing=plan.growing)
+            least = LEAST_BEFORE_FINISH if finish_designs(plan) else LEAST
+            self._search = Cma(self._space, plan.population, plan.seed, growing=plan.growing, least=least)
         else:
             self._search = Nsga2(self._space, plan.population, plan.seed)
         self._known: dict[bytes, Floats] = {}
