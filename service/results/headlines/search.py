@@ -220,7 +220,7 @@ def converged(found: Designs, *, over: bool) -> Phrase:
             generations=str(max(bests)), most=str(found.plan.generations), share=_percent(found.plan.least_gain),
         )  # fmt: skip
     same = unimproved(found)
-    if same >= max(_LEAST, round(_WITHOUT * found.plan.generations)):
+    if same >= max(_LEAST, round(_WITHOUT * found.plan.generations)) and _after(found, bests) <= _BETTER:
         return plural(
             "The search has converged: the last generation bettered the goal by less than {share} %.",
             "The search has converged: the last {count} generations bettered the goal by less than {share} %.",
@@ -234,6 +234,15 @@ def converged(found: Designs, *, over: bool) -> Phrase:
             "may come to another one."
         )
     return Phrase("The search has not converged: it was still becoming better, and more generations would help.")
+
+
+def _after(found: Designs, bests: dict[int, float]) -> float:
+    """The share by which the finish has bettered what the generations came to; 0 without one, or for the worse."""
+    last = found.rounds[-1].summary
+    if not last.get("finish") or last["best"][0] is None:
+        return 0.0
+    before, sign = bests[max(bests)], -1.0 if found.plan.best[0].max else 1.0
+    return max(0.0, sign * (before - last["best"][0])) / max(abs(before), 1e-300)
 
 
 def _ended(found: Designs) -> bool:

@@ -65,6 +65,14 @@ def test_a_search_says_whether_more_generations_would_help() -> None:
     )
 
 
+def test_generations_that_stood_still_far_from_the_optimum_have_not_converged() -> None:
+    """The finish betters by 25 % what six generations of few designs came to."""
+    search = _search([3.0, 2.0, 2.0, 2.0, 2.0, 2.0], {"finish": 20, "best": [1.5]})
+    assert _said(search).startswith("The search has not converged: its best design was brought")
+    little = _search([3.0, 2.0, 2.0, 2.0, 2.0, 2.0], {"finish": 20, "best": [1.999]})
+    assert _said(little).startswith("The search has converged: the last 4 generations")
+
+
 def test_a_search_that_ended_by_itself_says_after_how_many_generations() -> None:
     search = _search([3.0, 2.0, 1.0, 0.9995], generations=60, least_gain=2e-3)
     expected = (

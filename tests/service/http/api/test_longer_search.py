@@ -76,12 +76,10 @@ def test_what_is_wrong_is_named(service: Service) -> None:
         assert (pointer, code) in faults, (addition, faults)
 
 
-def test_the_headline_names_the_limits_that_bind(service: Service) -> None:
-    """The efficiency grows with the frequency alone: only the catalogue's failures and the speed bound it."""
+def test_the_page_names_the_limits_that_bind_and_derivatives_are_no_designs(service: Service) -> None:
     study_id = search(service, **ONE, generations=4)
-    headline = service.get(f"/studies/{study_id}")["headline"]
-    text = " ".join(headline["sentence"]) if isinstance(headline["sentence"], list) else headline["sentence"]
-    assert "limit" in text
+    page = service.http.get(f"/studies/{study_id}").text
+    assert "At the limit" in page or "No limit binds" in page
     rounds = service.store.studies.rounds(study_id)
     aside = [record for record in rounds if record.summary.get("derivatives")]
     listed = {design["design"] for design in service.get(f"/studies/{study_id}/front")["designs"]}
