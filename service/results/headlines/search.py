@@ -242,7 +242,7 @@ def _after(found: Designs, bests: dict[int, float]) -> float:
     if not last.get("finish") or last["best"][0] is None:
         return 0.0
     before, sign = bests[max(bests)], -1.0 if found.plan.best[0].max else 1.0
-    return max(0.0, sign * (before - last["best"][0])) / max(abs(before), 1e-300)
+    return max(0.0, sign * (before - float(last["best"][0]))) / max(abs(before), 1e-300)
 
 
 def _ended(found: Designs) -> bool:
