@@ -12,7 +12,9 @@ from typing import Any
 import pytest
 
 from sprag_study.engine.vibration_drive.regimes import settled_infos
-from sprag_study.service.results.regimes import motion_sentence
+from sprag_study.service.languages import language
+from sprag_study.service.reading.reader import shown
+from sprag_study.service.results.regimes import motion_sentence, rotation_sentences
 from tests.conftest import Finished
 
 Sprag = Callable[..., Finished]
@@ -90,3 +92,15 @@ def test_a_case_that_ends_otherwise_is_told(sprag: Sprag, examples: Path, tmp_pa
     (row,) = sprag("show", path, "settled", "--case", 178, "--json", "--at-most", 100).data
     assert row["ending"] != "ok"
     assert set(row["results"].values()) == {None}
+
+
+def test_turns_in_either_direction_are_said_in_both_languages() -> None:
+    row = {"regime.order": 3, "pendulums.0.winding": -1, "pendulums.1.winding": 0, "pendulums.2.winding": 2}
+    assert list(rotation_sentences(row)) == [
+        "Pendulum 1 turns over clockwise: 1 whole turn in 3 excitation periods.",
+        "Pendulum 3 turns over counter-clockwise: 2 whole turns in 3 excitation periods.",
+    ]
+    with language("uk"):
+        assert shown(rotation_sentences(row)[1]) == (
+            "Маятник 3 обертається проти годинникової стрілки: 2 повні оберти за 3 періоди збудження."
+        )
