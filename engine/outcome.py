@@ -250,6 +250,9 @@ class ClutchDuty:
     torque_equivalent : float
         Torque that, reached from zero and left again once in each engagement, does the same damage, in N*m. NaN without
         an exponent of the Wöhler curve, and for a clutch that does not engage.
+    torque_margin, frequency_margin, speed_margin : float
+        Rated torque over the largest torque, rated indexing frequency over engagements per time, rated overrunning
+        speed over the largest one. NaN without a rating, and without a load.
     """
 
     clutch: int
@@ -264,6 +267,9 @@ class ClutchDuty:
     slip_work_per_hour: float
     cycles_per_hour: float
     torque_equivalent: float
+    torque_margin: float
+    frequency_margin: float
+    speed_margin: float
 
 
 @dataclass(frozen=True, slots=True)

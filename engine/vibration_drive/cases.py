@@ -84,8 +84,8 @@ def default_of(path: str) -> float | None:
     return _DEFAULTS[".".join("N" if part.isdigit() else part for part in path.split("."))]
 
 
-def of_cases(columns: Mapping[str, ArrayLike], cases: NDArray[np.int64] | slice) -> dict[str, ArrayLike]:
-    """The parameters of some cases of a batch."""
+def of_cases(columns: Mapping[str, ArrayLike], cases: NDArray[np.int64] | slice | int) -> dict[str, ArrayLike]:
+    """The parameters of some cases of a batch, or as numbers those of one."""
     return {path: value[cases] if (value := np.asarray(column)).ndim else column for path, column in columns.items()}
 
 

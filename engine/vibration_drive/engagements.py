@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sprag_study.engine.outcome import Engagement, Engagements, PeriodMeans
 from sprag_study.engine.vibration_drive.automaton import Clutch
 from sprag_study.engine.vibration_drive.examined import Examined
-from sprag_study.engine.vibration_drive.pieces import Pieces, integrals, largest, products, rates
+from sprag_study.engine.vibration_drive.pieces import Pieces, integrals, largest, largest_each, products, rates
 
 Floats = NDArray[np.float64]
 
@@ -71,15 +71,17 @@ def _table(pieces: Pieces, period: float) -> list[Engagement]:
     """Every engagement in the pieces."""
     if not len(pieces.length):
         return []
-    peaks, on_shaft, of_pendulum, steepest, windups = (np.empty_like(pieces.counts) for _ in range(5))
-    for clutch in range(pieces.counts.shape[1]):
+    number = pieces.counts.shape[1]
+    on_shaft, of_pendulum = np.empty_like(pieces.counts), np.empty_like(pieces.counts)
+    series: list[Floats] = []
+    for clutch in range(number):
         torque = pieces.torques[:, clutch]
-        peaks[:, clutch] = largest(torque)
         on_shaft[:, clutch] = integrals(products(torque, pieces.speed), pieces.length)
         of_pendulum[:, clutch] = integrals(products(torque, pieces.speeds[:, clutch]), pieces.length)
         rate = rates(torque, pieces.length)
-        steepest[:, clutch] = np.maximum(largest(rate), largest(-rate))
-        windups[:, clutch] = largest(pieces.windup(clutch))
+        series += [torque, rate, -rate, pieces.windup(clutch)]
+    peaks, rising, falling, windups = np.array(largest_each(series)).reshape(number, 4, -1).transpose(1, 2, 0)
+    steepest = np.maximum(rising, falling)
     rows = []
     for stretch in _stretches(pieces):
         clutch, steps = stretch.clutch, slice(stretch.first, stretch.last + 1)
@@ -120,7 +122,8 @@ def _one_turn(pieces: Pieces, first: Pieces, begin: float, turn: int, period: fl
             back = turn * period if start >= turn else 0.0
             rows.append(replace(row, start=row.start - back, end=row.end - back))
     # A clutch that never lets go has neither start nor end.
-    rows += [row for row in _table(first, period) if row.end - row.start >= (turn - _SAME) * period]
+    if np.any(np.all(first.states >= Clutch.ENGAGED, axis=0)):
+        rows += [row for row in _table(first, period) if row.end - row.start >= (turn - _SAME) * period]
     return sorted(rows, key=lambda row: (row.start, row.order, row.clutch))
 
 

@@ -17,7 +17,7 @@ from sprag_study.engine.vibration_drive.layout import OUT_ENDING, PendulumSample
 from sprag_study.engine.vibration_drive.pieces import Pieces
 from sprag_study.engine.vibration_drive.regimes import Regime, settled_infos
 from sprag_study.engine.vibration_drive.results import result_infos
-from sprag_study.engine.vibration_drive.settle import settle
+from sprag_study.engine.vibration_drive.settle import SettledBatch, settle
 from sprag_study.engine.vibration_drive.strobes import BEGIN, PENDULUM_WIDTH, SHAFT_WIDTH, WINDUP
 
 Floats = NDArray[np.float64]
@@ -117,7 +117,11 @@ def examined_settled(columns: Mapping[str, ArrayLike], settings: SettledRun, sta
     ValueError
         If a required parameter is missing or the number of pendulums or coefficients is out of range.
     """
-    settled = settle(columns, settings, cases=1, starts=start)
+    return examined_motion(columns, settings, settle(columns, settings, cases=1, starts=start))
+
+
+def examined_motion(columns: Mapping[str, ArrayLike], settings: SettledRun, settled: SettledBatch) -> Examined:
+    """The settled motion of one case, which ``settle`` has given, as `examined_settled`."""
     regime, ending = Regime(int(settled.regimes[0])), ENDINGS[int(settled.endings[0])]
     period = 1.0 / float(np.asarray(columns["excitation.frequency"]))
     turn = int(settled.orders[0]) if regime.repeats else 0

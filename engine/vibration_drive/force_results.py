@@ -3,9 +3,11 @@
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from sprag_study.engine.catalogue import ResultInfo
+from sprag_study.engine.vibration_drive.cases import default_of
 
 _DIRECTIONS = {"x": "to the right", "y": "upward"}
 
@@ -90,3 +92,12 @@ class Bearing:
     exponent: float = 3.0
     share: float = 1.0
     shaft_mass: float = 0.0
+
+    @classmethod
+    def of(cls, values: Mapping[str, float]) -> "Bearing":
+        """What the parameters of a case say."""
+        rating, exponent, share, mass = (
+            float(values.get(path, default_of(path) or 0.0))
+            for path in ("shaft.bearing_rating", "shaft.bearing_exponent", "shaft.bearing_share", "shaft.rotor_mass")
+        )
+        return cls(rating if math.isfinite(rating) else math.nan, exponent, share, mass)

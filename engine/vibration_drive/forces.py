@@ -7,7 +7,6 @@ follow from the equations of motion. Means are Gaussian quadratures over each st
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,25 +22,19 @@ from sprag_study.engine.vibration_drive.force_results import Bearing, force_info
 from sprag_study.engine.vibration_drive.formulas import base_series, drive, free_acceleration
 from sprag_study.engine.vibration_drive.kernel import kernel_of
 from sprag_study.engine.vibration_drive.layout import PendulumSample
-from sprag_study.engine.vibration_drive.pieces import Pieces
+from sprag_study.engine.vibration_drive.pieces import CLOSER, PLACES, Pieces, polynomials
 from sprag_study.engine.vibration_drive.regimes import Regime
-from sprag_study.engine.vibration_drive.settle import settle
+from sprag_study.engine.vibration_drive.settle import SettledBatch, settle
 from sprag_study.engine.vibration_drive.strobes import BEGIN
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-#: Values at places of steps, shape (steps, places) each: those of the steps ``steps`` at ``x`` in fractions of each.
-_Values = Callable[[Ints, Floats], Floats]
-
 #: Nodes of a step's quadrature. It is exact up to degree 31, beyond the square of a step's series.
 _GAUSS = gauss(16)
 _NODES, _WEIGHTS = 0.5 * (1.0 + _GAUSS[0]), 0.5 * _GAUSS[1]
-#: Places of a step at which extremes are looked for, and how often the best of them is looked at more closely: each
-#: time the interval is an eighth of the one before, and the error a 64th.
-_PLACES, _CLOSER = np.linspace(0.0, 1.0, 17), 6
 
 
-def forces(columns: Mapping[str, ArrayLike], run: Run, bearing: Bearing, points: int) -> Forces:
+def forces(columns: Mapping[str, ArrayLike], run: Run, bearing: Bearing, points: int = 0) -> Forces:
     """The forces in the window of a run, of a run longer than ``MAX_PERIODS`` in its last periods at most.
 
     Parameters
@@ -91,7 +84,13 @@ def settled_forces(
         If a required parameter is missing or the number of pendulums or coefficients is out of range.
     """
     values = scalars(columns)
-    motion = settle(values, settings, cases=1, starts=start)
+    return forces_of_motion(values, settings, settle(values, settings, cases=1, starts=start), bearing, points)
+
+
+def forces_of_motion(
+    values: Mapping[str, float], settings: SettledRun, motion: SettledBatch, bearing: Bearing, points: int = 0
+) -> Forces:
+    """The forces of the settled motion of one case, which ``settle`` has given, as `settled_forces`."""
     regime, ending = Regime(int(motion.regimes[0])), ENDINGS[int(motion.endings[0])]
     if ending is not Ending.OK:
         return _nothing(ending, regime.name.lower())
@@ -235,8 +234,8 @@ class _Motion:
         (ax, jerk_x), (ay, jerk_y) = base_series(
             *amplitudes, nu, elementary.sin(turned), elementary.cos(turned), sin_chi, cos_chi
         )
-        speed = _polynomials(pieces.speeds[steps].swapaxes(0, 1), x)
-        torque = _polynomials(pieces.torques[steps].swapaxes(0, 1), x)
+        speed = polynomials(pieces.speeds[steps].swapaxes(0, 1), x)
+        torque = polynomials(pieces.torques[steps].swapaxes(0, 1), x)
         angle = self.angles[steps].T[:, :, np.newaxis] + length * _primitives(pieces.speeds[steps].swapaxes(0, 1), x)
         sin, cos = elementary.sin(angle), elementary.cos(angle)
         driven = drive([ax], [ay], [sin], [cos], 0)
@@ -256,7 +255,7 @@ class _Motion:
                 bodies.mass * velocity[0] - bodies.moment * speed * cos,
                 bodies.mass * velocity[1] - bodies.moment * speed * sin,
             ),
-            _polynomials(pieces.speed[steps], x),
+            polynomials(pieces.speed[steps], x),
         )
 
     def on_table(self, now: _Instant) -> tuple[Floats, Floats]:
@@ -268,17 +267,9 @@ class _Motion:
         )
 
 
-def _polynomials(series: Floats, x: Floats) -> Floats:
-    """Values of series, shape (..., steps, terms), at places of their steps, shape (steps, places)."""
-    value = np.zeros((*series.shape[:-1], x.shape[1]))
-    for k in range(series.shape[-1] - 1, -1, -1):
-        value = value * x + series[..., k, np.newaxis]
-    return value
-
-
 def _primitives(series: Floats, x: Floats) -> Floats:
-    """Integrals of series from the start of their steps, as ``_polynomials``, in fractions of the step."""
-    return x * _polynomials(series / np.arange(1, series.shape[-1] + 1), x)
+    """Integrals of series from the start of their steps, as ``polynomials``, in fractions of the step."""
+    return x * polynomials(series / np.arange(1, series.shape[-1] + 1), x)
 
 
 def _magnitude(x: Floats, y: Floats) -> Floats:
@@ -323,40 +314,52 @@ def _extremes(motion: _Motion, steps: Ints, out: dict[str, float]) -> None:
         powers = [-force * velocity for force, velocity in zip(total, now.velocity, strict=True)]
         return np.vstack([forces_x, forces_y, _magnitude(forces_x, forces_y), now.angle, powers])
 
-    def signed(place: int, sign: float, chosen: Ints, x: Floats) -> Floats:
-        return np.asarray(sign * every(chosen, x)[place])
-
-    grid = every(steps, np.tile(_PLACES, (len(steps), 1)))
     names = [*(f"pendulums.{i}" for i in range(n)), "table"]
     wanted = [f"{name}.force_{direction}" for direction in "xy" for name in names]
     wanted += [*(f"{name}.force" for name in names), *(f"pendulums.{i}.angle" for i in range(n))]
     wanted += [f"excitation.power_{direction}" for direction in "xy"]
-    for place, name in enumerate(wanted):
-        for end, sign in (("max", 1.0), ("min", -1.0)):
-            if end == "max" or not name.endswith((".force", "power_x", "power_y")):
-                out[f"{name}.{end}"] = sign * _largest(partial(signed, place, sign), sign * grid[place])
+    ends = [
+        (place, end, sign)
+        for place, name in enumerate(wanted)
+        for end, sign in (("max", 1.0), ("min", -1.0))
+        if end == "max" or not name.endswith((".force", "power_x", "power_y"))
+    ]
+    places, signs = np.array([place for place, _, _ in ends]), np.array([sign for _, _, sign in ends])
+    found = _largest(steps, every, places, signs)
+    for (place, end, sign), value in zip(ends, found.tolist(), strict=True):
+        out[f"{wanted[place]}.{end}"] = sign * value
 
 
-def _largest(values: _Values, grid: Floats) -> float:
-    """Largest value on all steps; ``grid`` has those at ``_PLACES`` of each."""
-    last = len(_PLACES) - 1
-    at, best = np.argmax(grid, axis=1), np.max(grid, axis=1)
-    sides = np.stack([np.maximum(at - 1, 0), np.minimum(at + 1, last)])
+def _largest(steps: Ints, every: Callable[[Ints, Floats], Floats], places: Ints, signs: Floats) -> Floats:
+    """Largest values of some quantities on all steps, shape (quantities,).
+
+    Parameters
+    ----------
+    steps : int array, shape (steps,)
+    every : function
+        The values of all quantities, shape (all, s, places), in steps (shape (s,)) at places (shape (s, places)) in
+        fractions of each.
+    places, signs : arrays, shape (quantities,)
+        Which of all they are, and the signs with which they count.
+    """
+    last = len(PLACES) - 1
+    grid = signs[:, np.newaxis, np.newaxis] * every(steps, np.tile(PLACES, (len(steps), 1)))[places]
+    at, best = np.argmax(grid, axis=2), np.max(grid, axis=2)
     # Between the places a smooth quantity rises above the best of them by less than it falls off to the places around.
     # At an edge the place beside may be as good, with the peak between both: so the next one counts too.
-    around = np.stack([np.maximum(at - 2, 0), np.minimum(at + 2, last)])
-    lowest = np.min(grid[np.arange(len(grid)), around], axis=0)
-    steps = np.flatnonzero(best + (best - lowest) >= np.max(best))
-    low, high = _PLACES[sides[0][steps]], _PLACES[sides[1][steps]]
-    largest = float(np.max(best))
-    for _ in range(_CLOSER):
-        x = low[:, np.newaxis] + (high - low)[:, np.newaxis] * _PLACES
-        seen = values(steps, x)
+    around = np.stack([np.maximum(at - 2, 0), np.minimum(at + 2, last)], axis=2)
+    lowest = np.min(np.take_along_axis(grid, around, axis=2), axis=2)
+    largest = np.max(best, axis=1)
+    which, chosen = np.nonzero(best + (best - lowest) >= largest[:, np.newaxis])
+    at, pairs = at[which, chosen], np.arange(len(which))
+    low, high = PLACES[np.maximum(at - 1, 0)], PLACES[np.minimum(at + 1, last)]
+    for _ in range(CLOSER):
+        x = low[:, np.newaxis] + (high - low)[:, np.newaxis] * PLACES
+        seen = signs[which, np.newaxis] * every(steps[chosen], x)[places[which], pairs]
         at = np.argmax(seen, axis=1)
-        largest = max(largest, float(np.max(seen)))
-        rows = np.arange(len(steps))
-        low, high = x[rows, np.maximum(at - 1, 0)], x[rows, np.minimum(at + 1, last)]
-    return largest
+        np.maximum.at(largest, which, seen[pairs, at])
+        low, high = x[pairs, np.maximum(at - 1, 0)], x[pairs, np.minimum(at + 1, last)]
+    return np.asarray(largest)
 
 
 def _springs(n: int, values: Mapping[str, float], out: dict[str, float]) -> None:

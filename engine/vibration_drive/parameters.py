@@ -22,8 +22,13 @@ DRAG = frozenset({"bearing_damping", "linear_load", "quadratic_load", "clutch_da
 CURVE = frozenset({"stribeck_load", "stribeck_speed", "cyclic_load", "load_cycles", "load_phase"})
 #: A load that swings with the angle of the shaft, for runs of a given time only.
 CYCLIC = "shaft.cyclic_load"
+#: What bearings and freewheels may bear, and what their loads need beside the motion, which it does not change.
+RATINGS = frozenset(
+    {"rated_torque", "rated_frequency", "rated_speed", "fatigue_exponent"}
+    | {"rotor_mass", "bearing_rating", "bearing_exponent", "bearing_share"}
+)
 #: Parameters that a study has only where they are given: studies from before they existed keep their cases.
-ONLY_GIVEN = START_STATES | DRAG | CURVE
+ONLY_GIVEN = START_STATES | DRAG | CURVE | RATINGS
 
 _PARAMETERS = (
     Parameter("gravity", "g", "m/s^2", 0.0, 1e3, False, STANDARD_GRAVITY, "gravitational acceleration"),
@@ -58,6 +63,46 @@ _PARAMETERS = (
         0.0,
         "viscous drag of its freewheel while it overruns; where it is not 0, a backstop keeps the shaft from turning "
         "back",
+    ),
+    Parameter(
+        "pendulums.N.rated_torque",
+        "T_r",
+        "N*m",
+        0.0,
+        1e9,
+        True,
+        _INF,
+        "rating of its freewheel: largest torque that it may transmit",
+    ),
+    Parameter(
+        "pendulums.N.rated_frequency",
+        "f_r",
+        "Hz",
+        0.0,
+        1e6,
+        True,
+        _INF,
+        "rating of its freewheel: most engagements per time (indexing frequency)",
+    ),
+    Parameter(
+        "pendulums.N.rated_speed",
+        "omega_r",
+        "rad/s",
+        0.0,
+        1e6,
+        True,
+        _INF,
+        "rating of its freewheel: largest speed at which it may overrun",
+    ),
+    Parameter(
+        "pendulums.N.fatigue_exponent",
+        "m",
+        "1",
+        0.0,
+        100.0,
+        True,
+        _INF,
+        "exponent of the Wöhler curve of its freewheel, for the equivalent torque",
     ),
     Parameter("pendulums.N.initial_angle", "phi(0)", "rad", -1e3, 1e3, False, 0.0, "angle at t = 0"),
     Parameter("pendulums.N.initial_speed", "phi'(0)", "rad/s", -1e6, 1e6, False, 0.0, "angular speed at t = 0"),
@@ -142,6 +187,46 @@ _PARAMETERS = (
     ),
     Parameter("shaft.load_cycles", "m", "1", 0.0, 1e3, True, 1.0, "cycles of the cyclic load in a turn of the shaft"),
     Parameter("shaft.load_phase", "psi", "rad", -1e3, 1e3, False, 0.0, "phase of the cyclic load at t = 0"),
+    Parameter(
+        "shaft.rotor_mass",
+        "m_e",
+        "kg",
+        0.0,
+        1e6,
+        False,
+        0.0,
+        "mass of the shaft and of what is fixed to it, centred on its axis, for the forces on table and bearings",
+    ),
+    Parameter(
+        "shaft.bearing_rating",
+        "C",
+        "N",
+        0.0,
+        1e12,
+        True,
+        _INF,
+        "basic dynamic radial load rating of the bearing that carries most, for its life",
+    ),
+    Parameter(
+        "shaft.bearing_exponent",
+        "p",
+        "1",
+        1.0,
+        10.0,
+        False,
+        3.0,
+        "exponent of the life of the bearing: 3 for ball bearings, 10/3 for roller bearings",
+    ),
+    Parameter(
+        "shaft.bearing_share",
+        "s",
+        "1",
+        0.0,
+        1.0,
+        True,
+        1.0,
+        "part of the load of all bearings that the bearing carries which carries most",
+    ),
     Parameter("shaft.initial_speed", "phi_e'(0)", "rad/s", 0.0, 1e6, False, 0.0, "shaft speed at t = 0"),
 )
 
@@ -165,6 +250,8 @@ _PLAUSIBLE: Mapping[str, tuple[float, Sentence]] = {
     "stribeck_speed": (1e3, IN_RPM),
     "linear_load": (1e3, IN_ANOTHER_UNIT),
     "quadratic_load": (100.0, IN_ANOTHER_UNIT),
+    "rated_torque": (1e5, Sentence("was it in N*mm?")),
+    "rated_speed": (1e4, IN_RPM),
     "backlash": (0.1, IN_DEGREES),
     "initial_angle": (math.pi, IN_DEGREES),
     "initial_windup": (1.0, IN_DEGREES),

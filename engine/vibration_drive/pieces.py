@@ -1,5 +1,6 @@
 """The steps of one case: their starts, lengths, and polynomials of speeds and torques."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,11 +19,11 @@ Flags = NDArray[np.bool_]
 #: speed; of each pendulum its clutch's state and number of engagements, then the series of its speed and its torque.
 WHOLE, FRACTION, LENGTH = range(3)
 HEAD = 3
-#: Points at which a polynomial is compared before its largest value is refined, and golden sections of that.
-_POINTS, _SECTIONS = 17, 40
-#: Halvings of the part of a step in which a polynomial turns.
-_HALVINGS = 40
-_GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+#: Places of a step at which extremes are looked for, and how often the best of them is looked at more closely: each
+#: time the interval is an eighth of the one before, and the error a 64th.
+PLACES, CLOSER = np.linspace(0.0, 1.0, 17), 6
+#: How often the interval in which a polynomial turns is divided by the places.
+_PARTS = 10
 
 
 def piece_width(lay: Layout) -> int:
@@ -156,8 +157,10 @@ def _windups(states: Ints, begins: Flags, gained: Floats) -> Floats:
 
 def integrals(series: Floats, length: Floats) -> Floats:
     """Integral of each series (rows) over its step."""
-    total: Floats = length * (series @ (1.0 / np.arange(1, series.shape[1] + 1)))
-    return total
+    total = np.zeros(len(series))
+    for k in range(series.shape[1] - 1, -1, -1):
+        total = total + series[:, k] / (k + 1)
+    return np.asarray(length * total)
 
 
 def products(one: Floats, other: Floats) -> Floats:
@@ -173,16 +176,23 @@ def largest(series: Floats) -> Floats:
 
     A step is short relative to the motion, so the maximum lies between the neighbours of the largest sample.
     """
-    grid = np.linspace(0.0, 1.0, _POINTS)
-    at = np.argmax(series @ (grid ** np.arange(series.shape[1])[:, np.newaxis]), axis=1)
-    low, high = grid[np.maximum(at - 1, 0)], grid[np.minimum(at + 1, _POINTS - 1)]
-    for _ in range(_SECTIONS):
-        left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-        falls = _at(series, left) > _at(series, right)
-        low, high = np.where(falls, low, left), np.where(falls, right, high)
-    ends = np.maximum(_at(series, np.zeros(len(series))), _at(series, np.ones(len(series))))
-    best: Floats = np.maximum(ends, _at(series, 0.5 * (low + high)))
+    rows, last = np.arange(len(series)), len(PLACES) - 1
+    x = np.tile(PLACES, (len(series), 1))
+    best = np.full(len(series), -np.inf)
+    for _ in range(1 + CLOSER):
+        seen = polynomials(series, x)
+        at = np.argmax(seen, axis=1)
+        best = np.maximum(best, seen[rows, at])
+        low, high = x[rows, np.maximum(at - 1, 0)], x[rows, np.minimum(at + 1, last)]
+        x = low[:, np.newaxis] + (high - low)[:, np.newaxis] * PLACES
     return best
+
+
+def largest_each(every: Sequence[Floats]) -> list[Floats]:
+    """`largest` of several arrays of series, which may have different orders, at once."""
+    terms = max(series.shape[1] for series in every)
+    joint = largest(np.vstack([np.pad(series, ((0, 0), (0, terms - series.shape[1]))) for series in every]))
+    return np.split(joint, np.cumsum([len(series) for series in every])[:-1])
 
 
 def turned(series: Floats, length: Floats, start: Floats) -> Floats:
@@ -206,24 +216,27 @@ def extremes(series: Floats) -> tuple[Ints, Floats]:
         Of the series.
     values : array, shape (values,)
     """
-    grid = np.linspace(0.0, 1.0, _POINTS)
     slope = series[:, 1:] * np.arange(1, series.shape[1])
-    rises = slope @ (grid ** np.arange(slope.shape[1])[:, np.newaxis]) >= 0.0
+    rises = polynomials(slope, np.tile(PLACES, (len(slope), 1))) >= 0.0
     rows, points = np.nonzero(rises[:, :-1] != rises[:, 1:])
-    low, high, first = grid[points], grid[points + 1], rises[rows, points]
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        before = (_at(slope[rows], middle) >= 0.0) == first
-        low, high = np.where(before, middle, low), np.where(before, high, middle)
-    every = np.arange(len(series))
-    at = np.concatenate([np.zeros(len(series)), 0.5 * (low + high), np.ones(len(series))])
-    all_rows = np.concatenate([every, rows, every])
-    order = np.lexsort((at, all_rows))
-    return all_rows[order], _at(series[all_rows], at)[order]
+    low, high, first = PLACES[points], PLACES[points + 1], rises[rows, points]
+    turns, every = slope[rows], np.arange(len(rows))
+    for _ in range(_PARTS):
+        x = low[:, np.newaxis] + (high - low)[:, np.newaxis] * PLACES
+        changed = (polynomials(turns, x) >= 0.0) != first[:, np.newaxis]
+        changed[:, -1] = True
+        at = np.maximum(np.argmax(changed, axis=1), 1)
+        low, high = x[every, at - 1], x[every, at]
+    whole = np.arange(len(series))
+    places = np.concatenate([np.zeros(len(series)), 0.5 * (low + high), np.ones(len(series))])
+    all_rows = np.concatenate([whole, rows, whole])
+    order = np.lexsort((places, all_rows))
+    return all_rows[order], polynomials(series[all_rows], places[:, np.newaxis])[order, 0]
 
 
-def _at(series: Floats, x: Floats) -> Floats:
-    value = np.zeros(len(series))
-    for k in range(series.shape[1] - 1, -1, -1):
-        value = value * x + series[:, k]
+def polynomials(series: Floats, x: Floats) -> Floats:
+    """Values of series, shape (..., steps, terms), at places of their steps, shape (steps, places)."""
+    value = np.zeros((*series.shape[:-1], x.shape[1]))
+    for k in range(series.shape[-1] - 1, -1, -1):
+        value = value * x + series[..., k, np.newaxis]
     return value

@@ -98,6 +98,11 @@ class SettledBatch:
         turns: Ints = np.nan_to_num(self.values[:, columns]).astype(np.int64)
         return turns
 
+    def of_case(self, case: int) -> "SettledBatch":
+        """The batch with one of the cases only."""
+        rows = slice(case, case + 1)
+        return SettledBatch(*(getattr(self, name)[rows] for name in SettledBatch.__slots__))
+
 
 class _Results:
     """The columns of a batch's results by name, filled as cases are settled."""

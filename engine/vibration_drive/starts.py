@@ -12,9 +12,11 @@ from sprag_study.engine.outcome import Basin
 from sprag_study.engine.run import SettledRun
 from sprag_study.engine.vibration_drive.cases import case_matrix, default_of, of_cases, pendulum_count
 from sprag_study.engine.vibration_drive.kernel import kernel_of
+from sprag_study.engine.vibration_drive.regimes import settled_infos
 from sprag_study.engine.vibration_drive.same_motions import Motions
 from sprag_study.engine.vibration_drive.settle import SettledBatch, settle
 from sprag_study.engine.vibration_drive.start_results import REGIME_INFOS, started_infos
+from sprag_study.engine.vibration_drive.strobes import PENDULUM_WIDTH, SHAFT_WIDTH, width
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -48,6 +50,8 @@ class StartedBatch:
         The further regimes, those of a case by falling share.
     members : int64 array, shape (cases, starts)
         Number of the regime to which each start comes; -1 where it did not end ok.
+    points, further_points : arrays, shapes (cases, strobes.width(n)) and (regimes, strobes.width(n))
+        States at strobes of these motions, as of a ``SettledBatch``.
     """
 
     values: Floats
@@ -55,6 +59,17 @@ class StartedBatch:
     further: Ints
     further_values: Floats
     members: Ints
+    points: Floats
+    further_points: Floats
+
+    def motions(self, *, further: bool) -> SettledBatch:
+        """The most frequent regime of each case, or the further regimes, as ``settle`` gives settled motions."""
+        values, points = (self.further_values, self.further_points) if further else (self.values, self.points)
+        n = (points.shape[1] - SHAFT_WIDTH) // PENDULUM_WIDTH
+        names = [info.name for info in settled_infos(n)]
+        regimes = np.nan_to_num(values[:, names.index("regime")]).astype(np.int8)
+        endings = np.full(len(values), _OK, dtype=np.int8) if further else self.endings
+        return SettledBatch(values[:, : len(names)], endings, regimes, points, np.zeros(len(values)))
 
 
 def wilson(reached: ArrayLike, starts: int) -> tuple[Floats, Floats]:
@@ -103,13 +118,16 @@ def settle_starts(
         parts.append(_settle_together(some, settings, own, count, min(step, cases - first)))
     if len(parts) == 1:
         return parts[0]
-    infos = len(started_infos(kernel_of(columns, settings.tolerance).LAYOUT.n))
+    n = pendulum_count(columns)
+    infos = len(started_infos(n))
     nothing = StartedBatch(
         np.empty((0, infos)),
         np.empty(0, np.int8),
         np.empty(0, np.int64),
         np.empty((0, infos)),
         np.empty((0, count), np.int64),
+        np.empty((0, width(n))),
+        np.empty((0, width(n))),
     )
     parts = parts or [nothing]
     return StartedBatch(
@@ -118,6 +136,8 @@ def settle_starts(
         np.concatenate([part.further + k * step for k, part in enumerate(parts)]),
         np.concatenate([part.further_values for part in parts]),
         np.concatenate([part.members for part in parts]),
+        np.concatenate([part.points for part in parts]),
+        np.concatenate([part.further_points for part in parts]),
     )
 
 
@@ -155,6 +175,8 @@ def _settle_together(
             going = going[np.isin(going // count, arrived)]
     own: list[Floats] = []
     further: list[Floats] = []
+    firsts: list[int] = []
+    later: list[int] = []
     rows: list[int] = []
     members = np.full((cases, count), -1, dtype=np.int64)
     endings = np.empty(cases, dtype=np.int8)
@@ -168,7 +190,13 @@ def _settle_together(
         own.append(found[0])
         further.append(found[1:])
         rows += [case] * (len(found) - 1)
-    return StartedBatch(np.stack(own), endings, np.array(rows, dtype=np.int64), np.concatenate(further), members)
+        begun = [int(group[0]) for group in groups] or [int(lanes[0])]
+        firsts.append(begun[0])
+        later += begun[1:]
+    return StartedBatch(
+        np.stack(own), endings, np.array(rows, dtype=np.int64), np.concatenate(further), members,
+        settled.points[firsts], settled.points[later],
+    )  # fmt: skip
 
 
 def _without_orbit(motions: Motions, count: int) -> Ints:

@@ -376,6 +376,11 @@ class ClutchDutyRow(TypedDict):
             "`exponent`, and where it does not engage"
         ),
     ]
+    torque_margin: Annotated[float | None, Doc("rated torque / largest torque; null without a rating or a load")]
+    frequency_margin: Annotated[
+        float | None, Doc("rated indexing frequency / engagements per time; null without a rating or a load")
+    ]
+    speed_margin: Annotated[float | None, Doc("rated overrunning speed / largest one; null without a rating or a load")]
 
 
 class TorqueCyclesRow(TypedDict):
@@ -396,7 +401,9 @@ class DutyTables(TypedDict):
     start: Annotated[float, Doc("start of the reported part, s")]
     end: Annotated[float, Doc("its end, s: after one turn of a periodic motion, or at the end of the window")]
     regime: Annotated[str | None, Doc("regime of the settled motion; null for a run of a given time")]
-    exponent: Annotated[float | None, Doc("exponent of the Wöhler curve")]
+    exponent: Annotated[
+        float | None, Doc("exponent of the Wöhler curve that was asked for; null: those of the machine, if any")
+    ]
     clutches: list[ClutchDutyRow]
     cycles: Annotated[list[TorqueCyclesRow], Doc("of each clutch, the largest ranges first")]
     ending: str

@@ -24,7 +24,7 @@ PARTS: Final = (
 RUN_LABELS: Final = {
     "until": N_("Each case runs"), "at_most": N_("At most"), "settled": N_("Settled within"),
     "max_period": N_("Largest order"), "duration": N_("Duration"), "tolerance": N_("Tolerance"),
-    "reset": N_("Windup counts"),
+    "reset": N_("Windup counts"), "loads": N_("Forces and duty"),
 }  # fmt: skip
 
 

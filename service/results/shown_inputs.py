@@ -111,6 +111,8 @@ def run_settings(study: Study, spec: Mapping[str, Any], reading: Reading) -> lis
 def _run_value(study: Study, item: Input, reading: Reading) -> str:
     """The value of a setting of the run that is not a choice."""
     value = study.run[item.path]
+    if isinstance(value, bool):
+        return gettext(_YES_NO[str(value).lower()])
     if value is None:  # the window
         return gettext(str(item.value))
     if isinstance(value, Mapping):

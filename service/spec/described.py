@@ -318,6 +318,10 @@ _DURATION: Final = (
 )
 _TOLERANCE: Final = "local relative error of the integration"
 _RESET: Final = "whether an upward crossing while torque is transmitted restarts the windup (literal)"
+_LOADS: Final = (
+    "whether the results have the forces on table and bearing and the duty of the clutches, with margins to their "
+    "ratings, too; each case takes longer"
+)
 _BACKLASH: Final = "whether the angles include the backlash, which is then subtracted"
 
 #: Fields of a run until it is settled.
@@ -334,6 +338,7 @@ DURATION: Final = Described("duration", RUN_LABELS["duration"], _DURATION, "time
 ANY_RUN: Final = named(
     Described("tolerance", RUN_LABELS["tolerance"], _TOLERANCE, "number", MIN_TOLERANCE, MAX_TOLERANCE, 1e-9),
     Described("reset", RUN_LABELS["reset"], _RESET, "choice", default="contact", choices=_READINGS),
+    Described("loads", RUN_LABELS["loads"], _LOADS, "flag", default=False),
 )
 #: Options of the fit of measured clutch data, besides the accuracy.
 FIT: Final = named(

@@ -20,6 +20,7 @@ from sprag_study.service.spec.described import ANY_RUN, DURATION, SETTLED_RUN, R
 from sprag_study.service.spec.lists import refuse_mixed
 from sprag_study.worker.limits import MAX_RUN_PERIODS
 from sprag_study.worker.models import MEANS_FROM_PERIODS
+from sprag_study.worker.models.vibration_drive.loads import LOADS
 
 if TYPE_CHECKING:
     import numpy as np
@@ -50,7 +51,7 @@ RUN: Final = {
     **_RUN.schema(),
     "not": {"allOf": [{"anyOf": [{"required": [name]} for name in names]} for names in (TIMED_FIELDS, SETTLED_FIELDS)]},
 }
-_ANY_DEFAULTS: Final[dict[str, Any]] = {name: field.default for name, field in ANY_RUN.items()}
+_ANY_DEFAULTS: Final[dict[str, Any]] = {name: field.default for name, field in ANY_RUN.items() if name != LOADS}
 #: Defaults of missing fields. A run without a field of `TIMED_FIELDS` lasts until it is settled.
 SETTLED_DEFAULTS: Final[dict[str, Any]] = {name: field.default for name, field in SETTLED_RUN.items()} | _ANY_DEFAULTS
 TIMED_DEFAULTS: Final[dict[str, Any]] = {"duration": [60.0, "periods"], "window": None, **_ANY_DEFAULTS}
@@ -75,6 +76,8 @@ def read_run(node: Node, frequencies: NDArray[np.float64]) -> dict[str, Any]:
     run = dict(SETTLED_DEFAULTS if settled else TIMED_DEFAULTS)
     start = node["duration"]
     run |= {name: field.read(node) for name, field in ((SETTLED_RUN | ANY_RUN) if settled else ANY_RUN).items()}
+    if not run[LOADS]:
+        del run[LOADS]  # studies of before the field existed are the same ones
     if settled:
         _warn_of_few_periods(node["at_most"], run["at_most"])
         return run

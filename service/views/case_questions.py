@@ -110,7 +110,7 @@ class DutyQuestion:
     exponent: Annotated[
         str | None,
         Setting(
-            "exponent of the Wöhler curve, for the equivalent torque",
+            "exponent of the Wöhler curve of all clutches, for the equivalent torque; by default that of the machine",
             examples=("5",),
             metavar="NUMBER",
             label=N_("Exponent of the Wöhler curve"),
@@ -135,7 +135,7 @@ class ForcesQuestion:
     shaft_mass: Annotated[
         str | None,
         Setting(
-            "mass of the shaft and of what is fixed to it, kg or with a unit; by default 0",
+            "mass of the shaft and of what is fixed to it, kg or with a unit; by default that of the machine",
             examples=("1.5 kg",),
             metavar="MASS",
             label=N_("Mass of the shaft"),
@@ -144,26 +144,26 @@ class ForcesQuestion:
     load_rating: Annotated[
         str | None,
         Setting(
-            "basic dynamic load rating C of the bearing, N or with a unit; without it there is no rating life",
+            "basic dynamic load rating C of the bearing, N or with a unit; by default that of the machine",
             examples=("12 kN",),
             metavar="FORCE",
             label=N_("Load rating of the bearing"),
         ),
     ] = None
     bearing: Annotated[
-        str,
+        str | None,
         Setting(
-            "kind of the bearing, for the exponent of its life",
+            "kind of the bearing, for the exponent of its life; by default the exponent of the machine",
             choices=("ball", "roller"),
             metavar="KIND",
             label=N_("Bearing"),
             words=(N_("ball bearing"), N_("roller bearing")),
         ),
-    ] = "ball"
+    ] = None
     share: Annotated[
         str | None,
         Setting(
-            "part of the load that the bearing with the largest load carries; by default 1",
+            "part of the load that the bearing with the largest load carries; by default that of the machine",
             examples=("0.5",),
             metavar="SHARE",
             label=N_("Its share of the load"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from sprag_study.sentences import Amount
@@ -45,7 +46,12 @@ _BEARS: Final[dict[str, Column]] = {
     "windup_min": Column(Phrase("Smallest windup"), "rad"),
     "windup_max": Column(Phrase("Largest windup"), "rad"),
     "slip_work_per_hour": Column(Phrase("Slip work (heat) per hour"), "J"),
+    "torque_margin": Column(Phrase("Rated torque over the largest")),
+    "frequency_margin": Column(Phrase("Rated indexing frequency over engagements")),
+    "speed_margin": Column(Phrase("Rated overrunning speed over the largest")),
 }
+#: Those that only clutches with ratings or with a Wöhler curve have.
+_OF_RATINGS: Final = ("torque_equivalent", "torque_margin", "frequency_margin", "speed_margin")
 
 _COUNTED: Final = Phrase("Cycles are counted by the rainflow method (ASTM E1049).")
 _EQUIVALENT: Final = Phrase("The equivalent torque, reached from zero once in each engagement, does the same damage.")
@@ -103,14 +109,16 @@ class DutyView(Clutched, CaseView[DutyQuestion, Chosen, Duty]):
     def shown(self, answer: DutyAnswer) -> Shown:
         """A sentence for each clutch, and the tables; or why there are none.
 
-        Where the motion has no orbit, that comes first. Equivalent torques are shown where an exponent is given.
+        Where the motion has no orbit, that comes first. Equivalent torques and margins are shown where there are any.
         """
-        duty, equivalent = answer.result, answer.chosen.exponent is not None
+        duty = answer.result
         if duty.ending != models.OK:
             return Shown((Phrase(models.ENDING_SENTENCES[duty.ending]),))
         if not any(row.torque_max for row in duty.rows):
             return Shown((Phrase("No clutch transmits torque."),))
-        columns = {name: column for name, column in _BEARS.items() if equivalent or name != "torque_equivalent"}
+        absent = {name for name in _OF_RATINGS if all(math.isnan(getattr(row, name)) for row in duty.rows)}
+        equivalent = "torque_equivalent" not in absent
+        columns = {name: column for name, column in _BEARS.items() if name not in absent}
         bears = [[row.clutch + 1, *(getattr(row, name) for name in columns)] for row in duty.rows]
         cycles = [[row.clutch + 1, row.range, row.mean, row.count, row.per_hour] for row in duty.cycles[:_SHOWN]]
         few = Phrase("The first {some} of {all}; the files contain all of them.", some=_SHOWN, all=len(duty.cycles))

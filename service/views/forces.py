@@ -21,7 +21,7 @@ from sprag_study.service.views.setting import Offered, choices_of
 from sprag_study.service.views.shown import Column, Shown, ShownTable
 from sprag_study.service.views.trajectory import timed_values, trajectory_csv
 from sprag_study.worker import models
-from sprag_study.worker.models.abilities import has_reactions, run_forces
+from sprag_study.worker.models.abilities import bearing_of, has_reactions, run_forces
 from sprag_study.worker.models.forces import Bearing, Forces
 
 if TYPE_CHECKING:
@@ -63,16 +63,20 @@ class ForcesView(CaseView[ForcesQuestion, tuple[Bearing, int, str], Forces]):
     lacks = N_("has no vibrating table, so that no forces act on one")
 
     def choose(self, study: Study, case: int, question: ForcesQuestion) -> tuple[Bearing, int, str]:
-        """What is known of the bearing, the number of times, and the table of a CSV file."""
+        """What is known of the bearing, from the question or else from the machine, the number of times, and the table
+        of a CSV file.
+        """
         if not self.has(study):
             message = f"A machine of model {study.model} has no vibrating table, so that no forces act on one."
             raise FaultError("not-found", message)
         texts = {name: getattr(question, name) for name in _RANGES}
         given = {name: amount_of(name, text, _RANGES[name]) for name, text in texts.items() if text and text.strip()}
-        kind = choice_of("bearing", question.bearing, _EXPONENTS)
+        kind = question.bearing and choice_of("bearing", question.bearing, _EXPONENTS)
+        machine = bearing_of(study, case)
         bearing = Bearing(
-            given.get("load_rating", math.nan), _EXPONENTS[kind], given.get("share", 1.0), given.get("shaft_mass", 0.0)
-        )
+            given.get("load_rating", machine.rating), _EXPONENTS[kind] if kind else machine.exponent,
+            given.get("share", machine.share), given.get("shaft_mass", machine.shaft_mass),
+        )  # fmt: skip
         return bearing, question.points, choice_of("table", question.table, choices_of(ForcesQuestion, "table"))
 
     def compute(self, study: Study, case: int, chosen: tuple[Bearing, int, str]) -> Forces:
@@ -127,7 +131,12 @@ class ForcesView(CaseView[ForcesQuestion, tuple[Bearing, int, str], Forces]):
 
     def offered(self, study: Study, case: int) -> dict[str, Offered]:
         """What is asked without other settings."""
-        return {"shaft_mass": Offered(hint="0 kg"), "load_rating": Offered(hint="N"), "share": Offered(hint="1")}
+        bearing = bearing_of(study, case)
+        rating = f"{bearing.rating:.6g} N" if math.isfinite(bearing.rating) else "N"
+        return {
+            "shaft_mass": Offered(hint=f"{bearing.shaft_mass:.6g} kg"), "load_rating": Offered(hint=rating),
+            "share": Offered(hint=f"{bearing.share:.6g}"),
+        }  # fmt: skip
 
     def shown(self, answer: ForcesAnswer) -> Shown:
         """The largest force and the life, and tables of the results; or why the case did not end ok.

@@ -61,6 +61,11 @@ def run_duty(study: Study, case: int, exponent: float | None) -> Duty:
     return _of(study, model_of(study.model).clutches, "clutches").duty(study, case, exponent)
 
 
+def bearing_of(study: Study, case: int) -> Bearing:
+    """What the parameters of one case say of the bearings of its shaft; ValueError where its machine has none."""
+    return _of(study, model_of(study.model).reactions, "forces on a table").bearing(study, case)
+
+
 def run_forces(study: Study, case: int, bearing: Bearing, points: int) -> Forces:
     """Forces of one case, with ``points`` equally spaced times; ValueError where its machine has none."""
     return _of(study, model_of(study.model).reactions, "forces on a table").forces(study, case, bearing, points)

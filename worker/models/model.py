@@ -42,6 +42,10 @@ class Clutches(Protocol):
 class Reactions(Protocol):
     """The machines of a model vibrate with a table, on which they act."""
 
+    def bearing(self, study: Study, case: int) -> Bearing:
+        """What the parameters of one case say of the bearings of its shaft."""
+        ...
+
     def forces(self, study: Study, case: int, bearing: Bearing, points: int) -> Forces:
         """Forces of one case, with ``points`` equally spaced times."""
         ...

@@ -29,6 +29,7 @@ _SECTIONS: Final = {
     "/run/duration": "theory#runs-of-a-given-time",
     "/run/window": "theory#runs-of-a-given-time",
     "/run/reset": "theory#the-automaton",
+    "/run/loads": "guide#forces-and-duty-of-every-case",
 }
 
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag_study.sentences import Sentence
+from sprag_study.service.languages import N_
 from sprag_study.service.reading.catalogue import result_of, unknown_result
 from sprag_study.service.reading.limits import number_in, quoted
 from sprag_study.service.reading.texts import quantity_text
 from sprag_study.service.reading.units import example, parse_quantity
 from sprag_study.service.spec.axes.axes import read_paths
 from sprag_study.service.spec.lists import refuse_mixed
+from sprag_study.worker.models.vibration_drive.loads import is_load
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -57,7 +59,9 @@ def read_result(node: Node) -> ResultInfo | None:
         node.mistake("must be the name of a result", allowed=allowed)
         return None
     info = result_of(infos, node.value)
-    if info is None:
+    if info is None and is_load(node.value):
+        node.refuse("unknown-name", "is a result where `run` has `loads`", allowed=N_('"loads": true in `run`'))
+    elif info is None:
         node.refuse("unknown-name", unknown_result(infos, node.value), allowed=allowed)
     return info
 

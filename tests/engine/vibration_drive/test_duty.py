@@ -14,7 +14,7 @@ import rainflow
 from sprag_study.engine.endings import Ending
 from sprag_study.engine.outcome import Duty
 from sprag_study.engine.run import SettledRun
-from sprag_study.engine.vibration_drive.duty import duty_of
+from sprag_study.engine.vibration_drive.duty import Rating, duty_of
 from sprag_study.engine.vibration_drive.engagements import tables_of
 from sprag_study.engine.vibration_drive.examined import Examined, examined, examined_settled
 from sprag_study.engine.vibration_drive.pieces import extremes
@@ -36,6 +36,11 @@ def counts(history: list[float], *, repeats: bool) -> dict[float, float]:
     for cycle in cycles(history, repeats=repeats):
         found[cycle.size] += cycle.number
     return dict(found)
+
+
+def exponents(exponent: float) -> list[Rating]:
+    """The Wöhler curve of each of two clutches."""
+    return [Rating(exponent=exponent)] * 2
 
 
 def settled(columns: Columns) -> Examined:
@@ -109,7 +114,7 @@ def test_the_equivalent_range() -> None:
 def test_the_duty_of_a_window_is_that_of_its_results(columns: Columns) -> None:
     run = periods(24, 14, 24)
     motion, row = examined(columns, run), one(columns, run)
-    duty, table = duty_of(motion, 4.0), tables_of(motion)
+    duty, table = duty_of(motion, exponents(4.0)), tables_of(motion)
     hours = 10.0 / columns["excitation.frequency"] / 3600.0
     assert (duty.ending, duty.start, duty.end) == (Ending.OK, table.start, table.end)
     for number, bears in enumerate(duty.rows):
@@ -132,7 +137,10 @@ def test_the_duty_of_a_window_is_that_of_its_results(columns: Columns) -> None:
 @pytest.mark.parametrize("columns", [w1(20.0, 0.002, 0.1), w1(35.0, 0.0015, 0.1), TWO, DAMPED])
 def test_the_duty_of_a_turn_is_that_of_many_periods(columns: Columns) -> None:
     turn = settled(columns)
-    duty, run = duty_of(turn, 3.0), duty_of(examined(columns, periods(840, 840 - 20 * turn.turn, 840)), 3.0)
+    duty, run = (
+        duty_of(turn, exponents(3.0)),
+        duty_of(examined(columns, periods(840, 840 - 20 * turn.turn, 840)), exponents(3.0)),
+    )
     assert duty.regime == "periodic"
     for settled_row, row in zip(duty.rows, run.rows, strict=True):
         for name in (
@@ -144,7 +152,7 @@ def test_the_duty_of_a_turn_is_that_of_many_periods(columns: Columns) -> None:
 
 def _impact(columns: Columns) -> Duty:
     """The duty of a clutch between a free pendulum and a free shaft at rest."""
-    return duty_of(examined(columns, periods(1.0, 0.0, 1.0)), 3.0)
+    return duty_of(examined(columns, periods(1.0, 0.0, 1.0)), exponents(3.0))
 
 
 def test_an_impact_with_a_spring_is_that_of_two_free_bodies() -> None:
@@ -240,7 +248,7 @@ def test_a_clutch_that_never_lets_go_has_the_range_of_its_windup() -> None:
         excitation__amplitude_x=1e-4, excitation__amplitude_y=0.0,
     )  # fmt: skip
     for motion in (settled(pressed), examined(pressed, periods(600, 590, 600))):
-        duty = duty_of(motion, 3.0)
+        duty = duty_of(motion, exponents(3.0))
         (bears,), largest = duty.rows, max(duty.cycles, key=lambda cycle: cycle.range)
         assert (bears.engagements_per_hour, bears.impact_speed_max, bears.torque_jump_max) == (0.0, 0.0, 0.0)
         assert math.isnan(bears.torque_equivalent)
@@ -252,7 +260,7 @@ def test_a_clutch_that_never_lets_go_has_the_range_of_its_windup() -> None:
 def test_a_run_that_begins_wound_up_counts_from_there() -> None:
     begun = drive(1, **pendulum(0, initial_windup=0.01, initial_clutch=2.0))
     run = periods(12, 0, 12)
-    (bears,), row = duty_of(examined(begun, run), 3.0).rows, one(begun, run)
+    (bears,), row = duty_of(examined(begun, run), exponents(3.0)).rows, one(begun, run)
     assert bears.windup_max == pytest.approx(row["pendulums.0.windup.max"], rel=1e-9)
     assert bears.windup_max >= 0.01
     assert bears.torque_jump_max == 0.0

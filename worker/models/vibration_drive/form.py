@@ -48,6 +48,9 @@ _WHOSE: Final = FormChoice(
     ),
 )  # fmt: skip
 
+#: What the maker of a clutch says of it.
+_RATINGS: Final = ("rated_torque", "rated_frequency", "rated_speed", "fatigue_exponent")
+
 FORM: Final = Form(
     parts=(
         Block("Vibration of the base", (FormField("excitation/*"),)),
@@ -75,11 +78,15 @@ FORM: Final = Form(
             {
                 "coefficients": "clutch/coefficients", "windup_limit": "clutch/windup_limit",
                 "backlash": "pendulums/N/backlash",
+                **{name: f"pendulums/N/{name}" for name in _RATINGS},
             },
             required=("coefficients",),
             twice="the clutch is given twice", foreign="is not a field of this clutch",
             change="Add or change a clutch", keep="Keep the clutch",
-            sets={"clutch/kind": "law", "clutch/windup_limit": ""},
+            # Those of another clutch are not its ratings.
+            sets={
+                "clutch/kind": "law", "clutch/windup_limit": "", **{f"pendulums/N/{name}": "" for name in _RATINGS},
+            },
         ),
     ),
     called="a vibration drive",

@@ -14,6 +14,7 @@ from sprag_study.engine import Ending, Run, Span
 from sprag_study.engine.catalogue import ResultInfo
 from sprag_study.engine.vibration_drive.cases import has_curve, has_drag
 from sprag_study.engine.vibration_drive.clutch import ClutchLawError, check_law
+from sprag_study.engine.vibration_drive.load_results import load_infos
 from sprag_study.engine.vibration_drive.parameters import (
     CLUTCH_COEFFICIENT,
     CLUTCH_WINDUP_LIMIT,
@@ -36,6 +37,13 @@ from sprag_study.worker.models.common import (
 from sprag_study.worker.models.model import Model
 from sprag_study.worker.models.starts import count_of, further_starts, has_starts
 from sprag_study.worker.models.vibration_drive.branches import branch_of, branch_results
+from sprag_study.worker.models.vibration_drive.loads import (
+    has_loads,
+    loads_seconds,
+    with_loads,
+    with_loads_of_starts,
+    with_settled_loads,
+)
 from sprag_study.worker.models.vibration_drive.presentation import PRESENTATION
 from sprag_study.worker.models.vibration_drive.sections import sections_of
 from sprag_study.worker.models.vibration_drive.settled import (
@@ -85,8 +93,9 @@ FLAG_SENTENCES: dict[str, str] = {
 }
 #: Most cases whose frequency is evaluated for an estimate.
 _SPREAD = 1_000
-#: Suffixes of the variants of settled studies and of those with starts, after the number of pendulums.
-_SETTLED_VARIANT, _STARTS_VARIANT = "-settled", "-starts"
+#: Suffixes of the variants of settled studies, of those with starts, and of those with forces and duty, after the
+#: number of pendulums.
+_SETTLED_VARIANT, _STARTS_VARIANT, _LOADS_VARIANT = "-settled", "-starts", "-loads"
 _INFOS: Final[dict[str, Callable[[int], tuple[ResultInfo, ...]]]] = {
     "": result_infos, _SETTLED_VARIANT: settled_infos, _STARTS_VARIANT: started_infos,
 }  # fmt: skip
@@ -94,8 +103,10 @@ _INFOS: Final[dict[str, Callable[[int], tuple[ResultInfo, ...]]]] = {
 
 @cache
 def _results(variant: str) -> tuple[ResultInfo, ...]:
-    number, dash, kind = variant.partition("-")
-    return _INFOS[f"{dash}{kind}"](int(number))
+    plain = variant.removesuffix(_LOADS_VARIANT)
+    number, dash, kind = plain.partition("-")
+    infos = _INFOS[f"{dash}{kind}"](int(number))
+    return infos if plain == variant else (*infos, *load_infos(int(number)))
 
 
 #: A drive whose known answers show all phases of its motion.
@@ -245,22 +256,28 @@ class VibrationDrive(Model):
         return (*PARAMETERS, CLUTCH_COEFFICIENT, CLUTCH_WINDUP_LIMIT)
 
     def variants(self) -> tuple[str, ...]:
-        return tuple(f"{number}{kind}" for kind in _INFOS for number in range(1, MAX_PENDULUMS + 1))
+        return tuple(
+            f"{number}{kind}{further}"
+            for further in ("", _LOADS_VARIANT)
+            for kind in _INFOS
+            for number in range(1, MAX_PENDULUMS + 1)
+        )
 
     def variant_of(self, study: Study) -> str:
         kind = _STARTS_VARIANT if has_starts(study.run) else _SETTLED_VARIANT if is_settled(study.run) else ""
-        return f"{pendulums(study)}{kind}"
+        return f"{pendulums(study)}{kind}{_LOADS_VARIANT if has_loads(study.run) else ''}"
 
     def results(self, variant: str) -> tuple[ResultInfo, ...]:
         return _results(variant)
 
     def numbered_by(self, variant: str) -> str | None:
-        return NUMBER if variant.endswith(_STARTS_VARIANT) else None
+        return NUMBER if variant.removesuffix(_LOADS_VARIANT).endswith(_STARTS_VARIANT) else None
 
     def result_catalogue(self) -> tuple[ResultInfo, ...]:
         # One pendulum represents all.
         one = "pendulums.0."
-        return tuple(replace(info, name=info.name.replace(one, "pendulums.N.")) for info in started_infos(1))
+        infos = (*started_infos(1), *load_infos(1))
+        return tuple(replace(info, name=info.name.replace(one, "pendulums.N.")) for info in infos)
 
     def shape_of(self, study: Study) -> KernelShape:
         drag, curved = has_drag(_paths(study)), has_curve(_paths(study))
@@ -297,10 +314,10 @@ class VibrationDrive(Model):
         if is_settled(task.run):
             settled = settle(task.columns, settings_of(task.run), cases=task.count)
             flags = _flags(settled_infos(number), settled.values)
-            return chunk_result(task.first, settled.endings, flags, settled.values)
+            return chunk_result(task.first, settled.endings, flags, with_settled_loads(task, settled))
         judged = simulate_judged(task.columns, run_of(task.run), cases=task.count)
         batch, flags = judged.batch, _flags(result_infos(number), judged.batch.values, judged.off)
-        return chunk_result(task.first, batch.endings, flags, batch.values)
+        return chunk_result(task.first, batch.endings, flags, with_loads(task, batch, run_of(task.run)))
 
     def extent(self, study: Study, case: int) -> Extent:
         """The run of one case; its periods are those of the excitation.
@@ -338,7 +355,8 @@ class VibrationDrive(Model):
 
         period = float(np.mean(1.0 / _frequencies(study)))
         key = _key_of(self.shape_of(study))
-        return estimate_seconds(key.pendulums, key.coefficients, key.tolerance, _mean_periods(study), period)
+        seconds = estimate_seconds(key.pendulums, key.coefficients, key.tolerance, _mean_periods(study), period)
+        return seconds + loads_seconds(study.run, key.pendulums)
 
     def estimate_compile_seconds(self, shape: KernelShape) -> float:
         """On one core: 7 s for the kernel of one pendulum, 13 s for eight; 3.7 s for the search of settled motions."""
@@ -374,9 +392,9 @@ class _Clutches:
 
     def duty(self, study: Study, case: int, exponent: float | None) -> Duty:
         """That of one turn of the settled motion for a settled study, otherwise that in the window."""
-        from sprag_study.engine.vibration_drive.duty import duty_of
+        from sprag_study.engine.vibration_drive.duty import duty_of, ratings_of
 
-        return duty_of(_examined(study, case), exponent)
+        return duty_of(_examined(study, case), ratings_of(case_machine(study, case), exponent))
 
 
 def _examined(study: Study, case: int) -> Examined:
@@ -389,6 +407,11 @@ def _examined(study: Study, case: int) -> Examined:
 
 
 class _Reactions:
+    def bearing(self, study: Study, case: int) -> Bearing:
+        from sprag_study.engine.vibration_drive.force_results import Bearing
+
+        return Bearing.of(case_machine(study, case))
+
     def forces(self, study: Study, case: int, bearing: Bearing, points: int) -> Forces:
         """Those of one turn of the settled motion for a settled study, otherwise those in the window."""
         from sprag_study.engine.vibration_drive.forces import forces, settled_forces
@@ -440,9 +463,10 @@ def _run_starts(task: ChunkTask, number: int) -> ChunkResult:
 
     found = settle_starts(task.columns, settings_of(task.run), further_starts(task.run), cases=task.count)
     infos = started_infos(number)
-    own = chunk_result(task.first, found.endings, _flags(infos, found.values), found.values)
+    values, further_values = with_loads_of_starts(task, found)
+    own = chunk_result(task.first, found.endings, _flags(infos, found.values), values)
     # Adding zero makes negative zeros positive, as in `chunk_result`.
-    further = FurtherRows(found.further, _flags(infos, found.further_values), found.further_values + 0.0)
+    further = FurtherRows(found.further, _flags(infos, found.further_values), further_values + 0.0)
     return replace(own, further=further)
 
 

@@ -133,6 +133,14 @@ PRESENTATION: Final = Presentation(
         **{f"pendulums.{name}": "theory#the-clutches" for name in ("clutch_damping", "overrunning_damping")},
         **{f"shaft.{name}": "theory#the-load" for name in ("load", *_LOADS)},
         **{
+            f"pendulums.{name}": "theory#duty"
+            for name in ("rated_torque", "rated_frequency", "rated_speed", "fatigue_exponent")
+        },
+        **{
+            f"shaft.{name}": "theory#forces"
+            for name in ("rotor_mass", "bearing_rating", "bearing_exponent", "bearing_share")
+        },
+        **{
             f"{clutch}.{name}": "theory#clutch-law-from-measured-data"
             for clutch in ("clutch", "pendulums.clutch")
             for name in ("data", "accuracy", "max_degree", "windup_limit")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sprag_study.worker.models.common import NO_PARAMETERS, ChunkResult, ChunkTask, chunk_result
+from sprag_study.worker.models.vibration_drive.loads import with_settled_loads
 from sprag_study.worker.models.vibration_drive.settled import ARBITRARY_START, JUMPED, RESTARTED, settings_of
 from sprag_study.worker.sweeps import line_to
 
@@ -33,7 +34,7 @@ def swept(task: ChunkTask, flags_of: Callable[[NDArray[np.float64]], list[str]])
         ",".join(filter(None, [own, *(name for name, cases in raised.items() if cases[case])]))
         for case, own in enumerate(flags_of(found.batch.values))
     ]
-    return chunk_result(task.first, found.batch.endings, flags, found.batch.values)
+    return chunk_result(task.first, found.batch.endings, flags, with_settled_loads(task, found.batch))
 
 
 def start_of(study: Study, case: int) -> NDArray[np.float64] | None:
