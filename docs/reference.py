@@ -29,6 +29,7 @@ from sprag_study.service.settings import table
 from sprag_study.worker import limits as limit
 from sprag_study.worker import models
 from sprag_study.worker.models import machine_shaft
+from sprag_study.worker.models.vibration_drive.loads import is_load
 from sprag_study.worker.states import StudyState
 
 FOLDER = Path(__file__).parent
@@ -80,7 +81,7 @@ def parameters(model: str) -> Iterator[Row]:
 def results(model: str, besides: Container[str] | None = None) -> Iterator[Row]:
     """Every result of a model that all cases have; or those that some cases have ``besides``."""
     for info in models.result_catalogue(model):
-        if info.name not in {*SETTLED_ONLY, *STARTS_ONLY} if besides is None else info.name in besides:
+        if info.name not in {*SETTLED_ONLY, *STARTS_ONLY, *LOADS} if besides is None else info.name in besides:
             yield f"`{info.name}`", info.unit, info.description
 
 
@@ -169,9 +170,11 @@ TIMED, SETTLED = (
 )
 #: Endings of cases of the drive that come from the engine.
 DRIVE_ENDINGS = {k: v for k, v in models.endings_of(DRIVE).items() if k not in set(models.WorkerEnding)}
-#: Results that cases of a given time have not, and those of cases with starts only.
+#: Results of studies with forces and duty, those that cases of a given time have not, and those of cases with starts
+#: only.
+LOADS = {info.name for info in models.result_catalogue(DRIVE) if is_load(info.name)}
 SETTLED_ONLY = SETTLED - TIMED
-STARTS_ONLY = {info.name for info in models.result_catalogue(DRIVE)} - SETTLED
+STARTS_ONLY = {info.name for info in models.result_catalogue(DRIVE)} - SETTLED - LOADS
 #: Name of a table, as the page has it in a comment above -> heads of its columns, and its rows.
 TABLES: dict[str, tuple[str, Iterable[Row]]] = {
     "commands": ("command | ", commands()),
@@ -182,6 +185,7 @@ TABLES: dict[str, tuple[str, Iterable[Row]]] = {
     **{f"results of the {WORDS[name]}": ("result | unit | ", results(name)) for name in models.model_names()},
     "results of settled cases": ("result | unit | meaning ", results(DRIVE, SETTLED_ONLY)),
     "results of cases with starts": ("result | unit | meaning ", results(DRIVE, STARTS_ONLY)),
+    "results of cases with forces and duty": ("result | unit | meaning ", results(DRIVE, LOADS)),
     "forces of a case": ("result | unit | meaning ", forces()),
     "regimes": ("regime | meaning ", meanings(models.REGIME_SENTENCES)),
     "endings": ("ending | ", meanings(dict(models.ENDING_SENTENCES))),

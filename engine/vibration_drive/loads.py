@@ -1,4 +1,5 @@
-"""Forces and duty of every case of a batch, as columns beside its results (docs/theory.md, "Forces" and "Duty").
+"""Forces and duty of every case of a batch, as columns beside its results (docs/theory.md, "Forces", "Duty of the
+clutches").
 
 They are those of the views of one case: computed from the steps of one more turn of its settled motion, or from those
 of its run, case after case.

@@ -1,4 +1,5 @@
-"""Studies of vibration drives with forces and duty among their results (docs/theory.md, "Forces" and "Duty").
+"""Studies of vibration drives with forces and duty among their results (docs/theory.md, "Forces", "Duty of the
+clutches").
 
 The run of such a study has ``"loads": true``.
 """

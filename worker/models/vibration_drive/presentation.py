@@ -133,7 +133,7 @@ PRESENTATION: Final = Presentation(
         **{f"pendulums.{name}": "theory#the-clutches" for name in ("clutch_damping", "overrunning_damping")},
         **{f"shaft.{name}": "theory#the-load" for name in ("load", *_LOADS)},
         **{
-            f"pendulums.{name}": "theory#duty"
+            f"pendulums.{name}": "theory#duty-of-the-clutches"
             for name in ("rated_torque", "rated_frequency", "rated_speed", "fatigue_exponent")
         },
         **{
