@@ -41,6 +41,12 @@ class DrivePendulum(TypedDict, total=False):
         (lambda_k), N*m*s/rad; >= 0 N*m*s/rad and <= 1e+06 N*m*s/rad.
     overrunning_damping : Viscous drag of its freewheel while it overruns; where it is not 0, a backstop keeps the shaft
         from turning back (lambda_o), N*m*s/rad; >= 0 N*m*s/rad and <= 1e+06 N*m*s/rad.
+    rated_torque : Rating of its freewheel: largest torque that it may transmit (T_r), N*m; > 0 N*m and <= 1e+09 N*m.
+    rated_frequency : Rating of its freewheel: most engagements per time (indexing frequency) (f_r), Hz; > 0 Hz and <=
+        1e+06 Hz.
+    rated_speed : Rating of its freewheel: largest speed at which it may overrun (omega_r), rad/s; > 0 rad/s and <=
+        1e+06 rad/s.
+    fatigue_exponent : Exponent of the Wöhler curve of its freewheel, for the equivalent torque (m); > 0 and <= 100.
     initial_angle : Angle at t = 0 (phi(0)), rad; >= -1000 rad and <= 1000 rad.
     initial_speed : Angular speed at t = 0 (phi'(0)), rad/s; >= -1e+06 rad/s and <= 1e+06 rad/s.
     initial_windup : Windup of its clutch at t = 0; of no effect where the clutch is free (u(0)), rad; >= -1000 rad and
@@ -58,6 +64,10 @@ class DrivePendulum(TypedDict, total=False):
     backlash: Quantity
     clutch_damping: Quantity
     overrunning_damping: Quantity
+    rated_torque: Quantity
+    rated_frequency: Quantity
+    rated_speed: Quantity
+    fatigue_exponent: Quantity
     initial_angle: Quantity
     initial_speed: Quantity
     initial_windup: Quantity
@@ -82,6 +92,13 @@ class DriveShaft(TypedDict, total=False):
         in runs of a given time (kappa); >= 0 and <= 1.
     load_cycles : Cycles of the cyclic load in a turn of the shaft (m); > 0 and <= 1000.
     load_phase : Phase of the cyclic load at t = 0 (psi), rad; >= -1000 rad and <= 1000 rad.
+    rotor_mass : Mass of the shaft and of what is fixed to it, centred on its axis, for the forces on table and bearings
+        (m_e), kg; >= 0 kg and <= 1e+06 kg.
+    bearing_rating : Basic dynamic radial load rating of the bearing that carries most, for its life (C), N; > 0 N and
+        <= 1e+12 N.
+    bearing_exponent : Exponent of the life of the bearing: 3 for ball bearings, 10/3 for roller bearings (p); >= 1 and
+        <= 10.
+    bearing_share : Part of the load of all bearings that the bearing carries which carries most (s); > 0 and <= 1.
     initial_speed : Shaft speed at t = 0 (phi_e'(0)), rad/s; >= 0 rad/s and <= 1e+06 rad/s.
     """
 
@@ -95,6 +112,10 @@ class DriveShaft(TypedDict, total=False):
     cyclic_load: Quantity
     load_cycles: Quantity
     load_phase: Quantity
+    rotor_mass: Quantity
+    bearing_rating: Quantity
+    bearing_exponent: Quantity
+    bearing_share: Quantity
     initial_speed: Quantity
 
 
@@ -123,6 +144,8 @@ class DriveRun(TypedDict, total=False):
     window : Part of the run that is evaluated, [start, end]; by default the last third.
     tolerance : Local relative error of the integration.
     reset : Whether an upward crossing while torque is transmitted restarts the windup (literal).
+    loads : Whether the results have the forces on table and bearing and the duty of the clutches, with margins to their
+        ratings, too; each case takes longer.
     """
 
     until: Literal["settled"]
@@ -133,6 +156,7 @@ class DriveRun(TypedDict, total=False):
     window: Sequence[Quantity]
     tolerance: Quantity
     reset: Literal["contact", "literal"]
+    loads: bool
 
 
 class Drive(Studies):
@@ -154,6 +178,10 @@ class Drive(Studies):
         "pendulums.*.backlash",
         "pendulums.*.clutch_damping",
         "pendulums.*.overrunning_damping",
+        "pendulums.*.rated_torque",
+        "pendulums.*.rated_frequency",
+        "pendulums.*.rated_speed",
+        "pendulums.*.fatigue_exponent",
         "pendulums.*.initial_angle",
         "pendulums.*.initial_speed",
         "pendulums.*.initial_windup",
@@ -170,6 +198,10 @@ class Drive(Studies):
         "shaft.cyclic_load",
         "shaft.load_cycles",
         "shaft.load_phase",
+        "shaft.rotor_mass",
+        "shaft.bearing_rating",
+        "shaft.bearing_exponent",
+        "shaft.bearing_share",
         "shaft.initial_speed",
         "clutch.windup_limit",
         "clutch.accuracy",
@@ -196,10 +228,13 @@ class Drive(Studies):
             Fields frequency, amplitude_x, amplitude_y, phase; needed: frequency.
         pendulums : values
             Fields inertia, mass, arm, spring_rate, spring_arm, damping, backlash, clutch_damping, overrunning_damping,
-            initial_angle, initial_speed, initial_windup, initial_clutch, clutch; needed: inertia, mass, arm.
+            rated_torque, rated_frequency, rated_speed, fatigue_exponent, initial_angle, initial_speed, initial_windup,
+            initial_clutch, clutch; needed: inertia, mass, arm.
         shaft : values
             Fields inertia, load, bearing_damping, linear_load, quadratic_load, stribeck_load, stribeck_speed,
             cyclic_load, load_cycles, load_phase, initial_speed; needed: inertia.
+            Fields inertia, load, bearing_damping, linear_load, quadratic_load, rotor_mass, bearing_rating,
+            bearing_exponent, bearing_share, initial_speed; needed: inertia.
         gravity : number or text with a unit, optional
             Gravitational acceleration (g), m/s^2; >= 0 m/s^2 and <= 1000 m/s^2.
         clutch : values, optional
@@ -211,7 +246,7 @@ class Drive(Studies):
             Name of the study.
         run : values, optional
             How long each case runs, what is evaluated, how accurately; fields until, at_most, settled, max_period,
-            duration, window, tolerance, reset.
+            duration, window, tolerance, reset, loads.
         derive : values, optional
             Parameters that follow from others in every case, by path: formulas of other parameters, of numbers with
             their units and of functions; `*` stands for every pendulum or step.

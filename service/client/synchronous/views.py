@@ -282,7 +282,7 @@ class StudyViews(StudyPart):
         Parameters
         ----------
         exponent : float or str, optional
-            Exponent of the Wöhler curve, for the equivalent torque.
+            Exponent of the Wöhler curve of all clutches, for the equivalent torque; by default that of the machine.
         """
         query = query_of({"exponent": exponent, "start": start})
         return Duty(cast("Any", self._of_case(case, "/duty", query)))
@@ -304,13 +304,13 @@ class StudyViews(StudyPart):
         Parameters
         ----------
         shaft_mass : float or str, optional
-            Mass of the shaft and of what is fixed to it, kg or with a unit; by default 0.
+            Mass of the shaft and of what is fixed to it, kg or with a unit; by default that of the machine.
         load_rating : float or str, optional
-            Basic dynamic load rating C of the bearing, N or with a unit; without it there is no rating life.
+            Basic dynamic load rating C of the bearing, N or with a unit; by default that of the machine.
         bearing : str, optional
-            Kind of the bearing, for the exponent of its life.
+            Kind of the bearing, for the exponent of its life; by default the exponent of the machine.
         share : float or str, optional
-            Part of the load that the bearing with the largest load carries; by default 1.
+            Part of the load that the bearing with the largest load carries; by default that of the machine.
         points : int, optional
             Equally spaced times.
         """
