@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
 #: Name of the field in `Study.run`.
 LOADS: Final = "loads"
-#: Seconds that they take in a case, for one pendulum and for each further one (docs/performance.md).
-_SECONDS, _SECONDS_EACH = 0.015, 0.005
+#: Seconds that they take in a case for each pendulum (benchmarks/loads.py).
+_SECONDS_EACH = 0.016
 
 
 def has_loads(run: Mapping[str, Any]) -> bool:
@@ -44,7 +44,7 @@ def loads_seconds(run: Mapping[str, Any], pendulums: int) -> float:
     """Rough time that they take in a case, in s; of a case with starts for two regimes."""
     if not has_loads(run):
         return 0.0
-    return (_SECONDS + _SECONDS_EACH * (pendulums - 1)) * min(2, count_of(run))
+    return _SECONDS_EACH * pendulums * min(2, count_of(run))
 
 
 def with_settled_loads(task: ChunkTask, settled: SettledBatch) -> Floats:
