@@ -325,8 +325,8 @@ def _extremes(motion: _Motion, steps: Ints, out: dict[str, float]) -> None:
         if end == "max" or not name.endswith((".force", "power_x", "power_y"))
     ]
     places, signs = np.array([place for place, _, _ in ends]), np.array([sign for _, _, sign in ends])
-    found = _largest(steps, every, places, signs)
-    for (place, end, sign), value in zip(ends, found.tolist(), strict=True):
+    extremes = _largest(steps, every, places, signs).tolist()
+    for (place, end, sign), value in zip(ends, extremes, strict=True):
         out[f"{wanted[place]}.{end}"] = sign * value
 
 

@@ -117,6 +117,7 @@ class DutyView(Clutched, CaseView[DutyQuestion, Chosen, Duty]):
         if not any(row.torque_max for row in duty.rows):
             return Shown((Phrase("No clutch transmits torque."),))
         absent = {name for name in _OF_RATINGS if all(math.isnan(getattr(row, name)) for row in duty.rows)}
+        absent -= {"torque_equivalent"} if answer.chosen.exponent is not None else set()
         equivalent = "torque_equivalent" not in absent
         columns = {name: column for name, column in _BEARS.items() if name not in absent}
         bears = [[row.clutch + 1, *(getattr(row, name) for name in columns)] for row in duty.rows]
