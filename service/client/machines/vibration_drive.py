@@ -232,9 +232,8 @@ class Drive(Studies):
             initial_clutch, clutch; needed: inertia, mass, arm.
         shaft : values
             Fields inertia, load, bearing_damping, linear_load, quadratic_load, stribeck_load, stribeck_speed,
-            cyclic_load, load_cycles, load_phase, initial_speed; needed: inertia.
-            Fields inertia, load, bearing_damping, linear_load, quadratic_load, rotor_mass, bearing_rating,
-            bearing_exponent, bearing_share, initial_speed; needed: inertia.
+            cyclic_load, load_cycles, load_phase, rotor_mass, bearing_rating, bearing_exponent, bearing_share,
+            initial_speed; needed: inertia.
         gravity : number or text with a unit, optional
             Gravitational acceleration (g), m/s^2; >= 0 m/s^2 and <= 1000 m/s^2.
         clutch : values, optional
