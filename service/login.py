@@ -24,7 +24,7 @@ LOGIN: Final = "`sprag login`"
 class Access(NamedTuple):
     """A service and its token: ``origin`` is one of `GIVEN`, `VARIABLE` and `LOGIN`, or "" without a token.
 
-    ``takes_variable`` is false for the service of a login that SPRAG_SERVER does not name: SPRAG_TOKEN is not for it.
+    ``takes_variable`` is false for the service of a login to which SPRAG_TOKEN is not sent.
     """
 
     server: str
@@ -38,8 +38,8 @@ def access_of(server: str | None, token: str | None) -> Access:
 
     What is given comes first, then ``SPRAG_SERVER`` and ``SPRAG_TOKEN``, then the login. A token that is kept is for
     the service of the same login only: it is sent to no other. ``SPRAG_TOKEN``, which may be the secret of a service
-    of this machine, is not sent to the service of a login, however its address is given, unless ``SPRAG_SERVER``
-    names it, too; ``sprag login`` itself sends it, and keeps it.
+    of this machine, is not sent to the service of a login, unless ``SPRAG_SERVER`` names it, too, or the login has no
+    token and the address is given; ``sprag login`` itself sends it, and keeps it.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def access_of(server: str | None, token: str | None) -> Access:
     named, kept = os.environ.get("SPRAG_SERVER", ""), profile()
     chosen = (named or kept.get("server") or DEFAULT_SERVER) if server is None else server
     of_login = _is_of(chosen, kept)
-    takes = not of_login or _place(chosen) == _place(named)
+    takes = not of_login or _place(chosen) == _place(named) or (server is not None and not kept.get("token"))
     if token is not None:
         return Access(chosen, token, GIVEN if token else "", takes)
     if takes and (secret := os.environ.get(VARIABLE)):

@@ -35,7 +35,8 @@ def commands() -> dict[str, set[str]]:
     found: dict[str, set[str]] = {}
 
     def collect(command: Any, path: tuple[str, ...]) -> set[str]:
-        options = {option for parameter in command.params for option in parameter.opts} | common
+        known = (*command.params, *getattr(command, "shared", ()))
+        options = {option for parameter in known for option in parameter.opts} | common
         options -= {option for name, option in GONE if name in path[:1]}  # still read, but no page may have them
         for key, inner in getattr(command, "commands", {}).items():
             options |= collect(inner, (*path, key))

@@ -84,7 +84,7 @@ def start(*, soon: bool = False) -> None:
         from opentelemetry.exporter.otlp.proto.http.trace_exporter import OTLPSpanExporter
         from opentelemetry.sdk.trace.export import BatchSpanProcessor
     except ImportError as error:
-        _LOG.warning("No traces are sent (%s): pip install 'sprag-study[traces]'.", error)
+        _LOG.warning('No traces are sent (%s): pip install "sprag-study[traces]".', error)
         return
     delay = _SOON if soon and "OTEL_BSP_SCHEDULE_DELAY" not in os.environ else None
     start_with(BatchSpanProcessor(OTLPSpanExporter(), schedule_delay_millis=delay))

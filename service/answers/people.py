@@ -48,6 +48,32 @@ class UserList(TypedDict):
     users: list[User]
 
 
+class Token(TypedDict):
+    """A token, without its secret."""
+
+    id: str
+    name: str
+    user: Annotated[str | None, Doc("whose it is; null: nobody's")]
+    scope: Annotated[str, Doc("read or write")]
+    state: Annotated[str, Doc("valid, expired, revoked, or user-removed")]
+    created_at: Moment
+    expires_at: Moment | None
+    used_at: Annotated[Moment | None, Doc("of its last use, to the minute")]
+    revoked_at: Annotated[Moment | None, Doc("of a renewed one the time until which it is valid")]
+
+
+class TokenList(TypedDict):
+    """All tokens, newest first."""
+
+    tokens: list[Token]
+
+
+class CreatedToken(Token):
+    """A new token."""
+
+    token: Annotated[str, Doc("its secret, which is shown only here")]
+
+
 class HandedOver(TypedDict):
     """What belongs to another user now."""
 

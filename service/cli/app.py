@@ -32,7 +32,7 @@ from sprag_study.service.cli.console import (
 from sprag_study.service.cli.groups import Groups, LazyCommands, Word, common_first
 from sprag_study.service.cli.language import OPTION, VARIABLE, chosen, code_of, refusal, translate
 from sprag_study.service.cli.old_words import forwarded, without_gone
-from sprag_study.service.extras import command_for
+from sprag_study.service.extras import MissingExtraError, command_for
 from sprag_study.service.faults import FaultError, Kind
 from sprag_study.service.languages import N_, _
 
@@ -199,8 +199,6 @@ class _PipeClosedError(Exception):
 
 
 def _invoke(arguments: list[str]) -> int:
-    from sprag_study.worker.ports import ExecutorError, StoreError
-
     try:
         code = command_line(languages.current())(arguments, prog_name="sprag", standalone_mode=False) or ExitCode.DONE
         if code == ExitCode.INTERRUPTED:  # as typer returns Ctrl-C
@@ -210,8 +208,8 @@ def _invoke(arguments: list[str]) -> int:
         return _report(failure)
     except FaultError as error:
         return _report(TroubleError(cast("Kind", error.code), error.detail, error.faults))
-    except (StoreError, ExecutorError) as error:
-        return _report(TroubleError(cast("Kind", error.code), str(error)))
+    except MissingExtraError as error:
+        return _report(TroubleError("missing-extra", str(error)))
     except typer.TyperException as error:
         return _usage(error)
     except typer.Abort:
@@ -224,6 +222,10 @@ def _invoke(arguments: list[str]) -> int:
         # typer turns a broken pipe into exit code 1, which here means a fault of the program.
         raise _PipeClosedError from stop
     except Exception as error:
+        from sprag_study.worker.ports import ExecutorError, StoreError
+
+        if isinstance(error, StoreError | ExecutorError):
+            return _report(TroubleError(cast("Kind", error.code), str(error)))
         command = command_for(error) if isinstance(error, ModuleNotFoundError) else None
         if command is not None:
             return _report(

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
 
@@ -18,10 +18,10 @@ from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import ExitCode, WrongInputError, say, write_json, wrong_option
 from sprag_study.service.cli.described import option, parameter, query_of, signed
 from sprag_study.service.cli.file_formats import require_csv, value_format
-from sprag_study.service.cli.files import output, read_study, require_cases, to_file, write_pieces
+from sprag_study.service.cli.files import output, require_cases, to_file, write_pieces
 from sprag_study.service.cli.names import study_of
 from sprag_study.service.cli.options import SHARED, in_decimals, in_language
-from sprag_study.service.cli.remote import connection
+from sprag_study.service.cli.remote import connection, study_named
 from sprag_study.service.cli.sources import SpecOrStudy, is_study, refuse_local
 from sprag_study.service.faults import Fault, FaultError
 from sprag_study.service.formats import PICTURES
@@ -51,7 +51,7 @@ def command(about: ViewInfo) -> Callable[..., None]:
     def run(
         spec: str, case: int, file: str | None, points_file: str | None = None, tables: list[str] | None = None,
         start: int | None = None, every: bool = False, decimal: Decimal | None = None, form: str | None = None,
-        **settings: Any,
+        db: str | None = None, **settings: Any,
     ) -> None:  # fmt: skip
         written = value_format(file, PICTURES if about.pictures else (), form)
         require_csv(None, decimal, written)
@@ -59,7 +59,7 @@ def command(about: ViewInfo) -> Callable[..., None]:
         if is_study(spec):
             from sprag_study.service.client.wire import case_path
 
-            refuse_local(every=every, points_file=points_file, tables=tables)
+            refuse_local(every=every, points_file=points_file, tables=tables, db=db)
             query = [*query_of(asked, settings), *([] if start is None else [("start", str(start))]), *drawing]
             with connection() as client:
                 path = case_path(study_of(client, spec), case, f"/{about.name}")
@@ -70,7 +70,7 @@ def command(about: ViewInfo) -> Callable[..., None]:
         from sprag_study.service.views import cases
 
         view = cases.CASE_VIEWS[about.name]
-        study = read_study(spec, points_file, files=tables).study
+        study = study_named(spec, points_file, tables, db).study
         require_cases(study, [case])
         if every and case:
             raise wrong_option(
@@ -86,7 +86,7 @@ def command(about: ViewInfo) -> Callable[..., None]:
 
     options = [parameter(one.name, option(one), one.default) for one in asked]
     shared = {"case": 0, **({"start": None} if about.starts else {}), **({} if counted else {"points_file": None})}
-    shared |= dict.fromkeys(("tables", "file", "decimal"))
+    shared |= dict.fromkeys(("tables", "db", "file", "decimal"))
     last = [parameter(name, SHARED[name], default) for name, default in shared.items()]
     last += [parameter("every", _EachCase, False)] if about is TRANSIENT else []
     last += [parameter("form", _Form, None)]
@@ -125,6 +125,27 @@ def naming_options(study: Study, asked: Sequence[NamedSetting], lacks: str) -> I
             for fault in error.faults
         ]
         raise WrongInputError("invalid-parameter", _("invalid option"), faults) from error
+
+
+#: Codes of faults of names, which no further case of a study undoes.
+_OF_NAMES: Final = ("not-an-axis", "unknown-name", "not-numeric", "invalid-choice")
+
+
+@contextmanager
+def before_run(study: Study, asked: Sequence[NamedSetting]) -> Iterator[None]:
+    """Name options as `naming_options`; of a study that chooses its own cases only what these leave as it is."""
+    with naming_options(study, asked, ""):
+        try:
+            yield
+        except FaultError as error:
+            if study.plan is None or not error.faults or any(map(_stays, error.faults)):
+                raise
+
+
+def _stays(fault: Fault) -> bool:
+    """Whether a fault stays whatever cases a study chooses: of a name, or of a view that it does not have."""
+    named = fault.code in _OF_NAMES and fault.value is not None
+    return named or fault.where is None or fault.code == "not-used"
 
 
 def _named(options: dict[str, str], fault: Fault) -> str:

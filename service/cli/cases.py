@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import typer
 
 from sprag_study.service.cli import completion
-from sprag_study.service.cli.case_views import naming_options
+from sprag_study.service.cli.case_views import before_run
 from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.compare import pair
 from sprag_study.service.cli.console import (
@@ -92,10 +92,8 @@ def _check(asked: Mapping[str, Any], results: Sequence[str], parsed: ParsedSpec)
     from sprag_study.worker.models import study_results
 
     _require_results(results, [info.name for info in study_results(parsed.study)])
-    with naming_options(parsed.study, _ASKED, ""):
-        query = wanted(CasesQuestion(**asked))
-        if parsed.study.plan is None:  # otherwise the cases that it chooses decide what can be asked
-            check(parsed.study, query)
+    with before_run(parsed.study, _ASKED):
+        check(parsed.study, wanted(CasesQuestion(**asked)))
 
 
 def _require_results(names: Sequence[str], known: Collection[str]) -> None:

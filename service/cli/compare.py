@@ -6,14 +6,13 @@ import json
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from sprag_study.service.answers.differing import MOST_COMPARED
 from sprag_study.service.cli import completion
-from sprag_study.service.cli.case_views import naming_options
+from sprag_study.service.cli.case_views import before_run
 from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import (
     Column,
@@ -35,6 +34,7 @@ from sprag_study.service.views.study_questions import CurvesQuestion
 
 if TYPE_CHECKING:
     from sprag_study.service.spec.document import ParsedSpec
+    from sprag_study.worker.study import Study as Inputs
 
 
 def compare(
@@ -71,6 +71,7 @@ def compare(
     """Compare studies: the inputs in which they differ, and the same curves of each. Specs are run here first."""
     from sprag_study.service.client import Study
     from sprag_study.service.client import compare as side_by_side
+    from sprag_study.service.client.wire import study_path
 
     if not 2 <= len(studies) <= MOST_COMPARED:
         raise wrong_option(
@@ -80,13 +81,20 @@ def compare(
         refuse_local(db=db)
     held = dict(pair(text) for text in at or ())
     asked = CurvesQuestion(x, y, *((by, at) if x else (None, None)), rest="usual")  # else those of the first x
+    specs: list[Inputs] = []
+
+    def check(parsed: ParsedSpec) -> None:
+        _check(asked, held, parsed.study)
+        specs.append(parsed.study)
+
+    ready = [opened(text, db=None if is_study(text) else db, check=check) for text in studies]
     with ExitStack() as stack:
-        sources = [
-            stack.enter_context(opened(text, db=None if is_study(text) else db, check=partial(_check, asked)))
-            for text in studies
-        ]
-        named = [Study(source, study_id) for source, study_id in sources]
-        found = side_by_side(named, x, y or (), by=by or (), at=held)
+        entered = {place: stack.enter_context(ready[place]) for place, text in enumerate(studies) if is_study(text)}
+        if specs and held:
+            _require_axes(held, specs, [source.request("GET", study_path(name)) for source, name in entered.values()])
+        entered |= {place: stack.enter_context(one) for place, one in enumerate(ready) if place not in entered}
+        sources = [entered[place] for place in range(len(studies))]
+        found = side_by_side([Study(*source) for source in sources], x, y or (), by=by or (), at=held)
     ids = [study_id for _, study_id in sources]
     names = list(found.names) if db is not None else _by_file(found.names, studies, ids)
     curves = [(name, drawn.data) for name, drawn in zip(names, found.curves, strict=False)]
@@ -125,15 +133,31 @@ def _by_file(names: Sequence[str], studies: Sequence[str], ids: Sequence[str]) -
     return shown
 
 
-def _check(asked: CurvesQuestion, parsed: ParsedSpec) -> None:
-    """Refuse axes and results that the study of a spec has not before it is run; WrongInputError."""
+def _check(asked: CurvesQuestion, held: Mapping[str, str], study: Inputs) -> None:
+    """Refuse axes, values and results that the study of a spec has not before it is run; WrongInputError."""
+    from sprag_study.service.results.selection import locate_axes, numeric_results
     from sprag_study.service.views.curves import CurvesView
+    from sprag_study.worker.models import study_results
 
-    view, study = CurvesView(), parsed.study
-    if study.plan is None and study.axes and (asked.x or asked.y):
-        with naming_options(study, settings_of(CurvesQuestion), ""):
-            own = [text for text in asked.at or () if pair(text)[0] in study.axis_paths]  # others may have the rest
-            view.check(study, view.choose(study, replace(asked, x=asked.x or study.axis_paths[0], at=own)))
+    own = {path: value for path, value in held.items() if study.axis_of(path) is not None}  # others may have the rest
+    with before_run(study, settings_of(CurvesQuestion)):
+        locate_axes(study, [*own.items()])
+        numeric_results(study_results(study), "y", asked.y or ())
+        if asked.x and study.axes:
+            at = [f"{path}={value}" for path, value in own.items()]
+            CurvesView().check(study, CurvesView().choose(study, replace(asked, at=at)))
+
+
+def _require_axes(held: Mapping[str, str], specs: Sequence[Inputs], others: Sequence[dict[str, Any]]) -> None:
+    """Refuse values of what varies in none of the studies, unless they are those that all cases have."""
+    from sprag_study.service.results.selection import locate_axes
+
+    vary = {path for detail in others for axis in detail["axes"] for path in axis["paths"]}
+    for path, value in held.items():
+        if path not in vary and all(study.axis_of(path) is None for study in specs):
+            for study in specs:
+                with before_run(study, settings_of(CurvesQuestion)):
+                    locate_axes(study, [(path, value)])
 
 
 def pair(text: str) -> tuple[str, str]:

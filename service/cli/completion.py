@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import typer
 
@@ -14,7 +14,6 @@ from sprag_study.worker.codes import ENDING_CODES, FLAG_MASKS, PENDING, REGIME_C
 
 if TYPE_CHECKING:
     from sprag_study.service.client import Client
-    from sprag_study.service.storage.people.people import TokenRecord
     from sprag_study.service.storage.store import Store
 
 #: Variable in which typer's scripts ask for completions, or people for such a script.
@@ -57,30 +56,27 @@ def schedules(context: typer.Context, incomplete: str) -> list[tuple[str, str]]:
 
 def tokens(context: typer.Context, incomplete: str) -> list[tuple[str, str]]:
     """Ids of the tokens that are not revoked, each with its name, and names."""
-
-    def valid(store: Store) -> list[TokenRecord]:
-        now = store.clock.now()
-        return [token for token in store.people.tokens() if not token.revoked_by(now)]
-
-    records = _stored(context, valid)
-    ids = [(token.id, f"{token.name}, {token.scope.value}") for token in records]
-    return ids + _names(incomplete, ((token.name, token.id) for token in records))
+    listed = [it for it in _of_people(context, lambda people: people.tokens()) if it["state"] != "revoked"]
+    ids = [(it["id"], f"{it['name']}, {it['scope']}") for it in listed]
+    return ids + _names(incomplete, ((it["name"], it["id"]) for it in listed))
 
 
 def users(context: typer.Context) -> list[tuple[str, str]]:
     """Names of the users of the service or of the database; each with the role, a removed one too."""
+    return [(user["name"], user["role"]) for user in _of_people(context, lambda people: people.users())]
+
+
+def _of_people(context: typer.Context, ask: Callable[[Any], list[Any]]) -> Sequence[Any]:
+    """What the users and tokens of the service or of the database are asked for."""
     from sprag_study.service.cli.stores import asks_service
 
     with _typed(context):
         asks = context.params.get("db") is None and asks_service(None)
-    if not asks:
-        return stored_users(context)
-    return _asked(context, lambda client: [(user["name"], user["role"]) for user in client.users()])
+    if asks:
+        return _asked(context, ask)
+    from sprag_study.service.jobs.users import StoredUsers
 
-
-def stored_users(context: typer.Context) -> list[tuple[str, str]]:
-    """Names of the users of the database, as `users` gives them."""
-    return [(user.name, user.role.value) for user in _stored(context, lambda store: store.people.users())]
+    return _stored(context, lambda store: ask(StoredUsers(store.people)))
 
 
 def _names(incomplete: str, named: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:

@@ -148,13 +148,12 @@ def read_study(
             raise spec_failure(path, error) from error
 
 
-def require_cases(study: Study, cases: Iterable[int]) -> None:
-    """Raise WrongInputError for numbers that no case has."""
-    allowed = f"0 .. {study.cases - 1}"
+def require_cases(study: Study, cases: Iterable[int], most: int | None = None) -> None:
+    """Raise WrongInputError for numbers that no case has, of at ``most`` so many; by default, of those of the study."""
+    most = study.cases if most is None else most
+    allowed = f"0 .. {most - 1}"
     problems = [
-        Fault("--case", "unknown-name", N_("there is no such case"), case, allowed)
-        for case in cases
-        if case >= study.cases
+        Fault("--case", "unknown-name", N_("there is no such case"), case, allowed) for case in cases if case >= most
     ]
     if problems:
         raise WrongInputError("invalid-parameter", _("invalid option"), problems)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from copy import copy
 from importlib import import_module
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, cast
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command_from_info, get_group_from_info
 from typer.models import CommandInfo, TyperInfo
 
@@ -59,10 +60,11 @@ def command_of(name: str, source: Callable[..., None] | typer.Typer) -> Any:
     """The command of a function, or the group of an application of typer."""
     command: Any
     if isinstance(source, typer.Typer):
+        _let_share(source)
         command = get_group_from_info(
             TyperInfo(source, name=name), suggest_commands=True, pretty_exceptions_short=False, rich_markup_mode=None
         )
-        _list_once(command, name, command.params)
+        _share(command, name, command.params)
     else:
         command = get_command_from_info(
             CommandInfo(name, callback=source), pretty_exceptions_short=False, rich_markup_mode=None
@@ -90,26 +92,57 @@ def _with_numbers(command: Any) -> None:
         _with_numbers(inner)
 
 
-def _list_once(group: Any, name: str, options: Sequence[Any]) -> None:
-    """Hide options of commands that their group lists; the help of a command has a line for each."""
-    listed = {(option.name, *option.opts) for option in options}
+def _let_share(group: typer.Typer) -> None:
+    """Let the commands of a group take options from it."""
+    for info in group.registered_commands:
+        info.cls = Sharing
+    for inner in group.registered_groups:
+        _let_share(cast("typer.Typer", inner.typer_instance))
+
+
+def _share(group: Any, name: str, options: Sequence[Any]) -> None:
+    """Give the commands of a group the options that it has, in the place of what they say of these themselves."""
     for command in group.commands.values():
-        hidden = [option for option in command.params if (option.name, *option.opts) in listed]
-        for option in hidden:
-            option.hidden = True
-        if hidden and not command.epilog:
-            names = [" ".join([", ".join(option.opts), option.metavar or ""]).rstrip() for option in hidden]
-            width = max(map(len, names)) + 2
-            lines = [f"{text:{width}}{_short(option)}" for text, option in zip(names, hidden, strict=True)]
-            command.epilog = "\n".join(["\b", _("More, which `sprag {group} -h` explains:", group=name), *lines])
         if hasattr(command, "commands"):
-            _list_once(command, name, options)
+            _share(command, name, options)
+            continue
+        said = {_parsed_as(option) for option in command.params}
+        command.shared = [option for option in options if _parsed_as(option) in said]
+        command.group = name
+        taken = set(map(_parsed_as, command.shared))
+        command.params = [option for option in command.params if _parsed_as(option) not in taken]
 
 
-def _short(option: Any) -> str:
+def _parsed_as(option: Any) -> tuple[object, ...]:
+    """What tells options from each other that are read alike, apart from their help."""
+    return option.name, *option.opts, option.multiple if option.param_type_name == "option" else None
+
+
+class Sharing(TyperCommand):
+    """A command with options of its group, which may stand before the command or behind."""
+
+    shared: Sequence[Any] = ()
+    group = ""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """The arguments and options of the command, then those of its group."""
+        return [*self.params, *self.shared, *super().get_params(ctx)[len(self.params) :]]
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Write the options of the command with their help, and a line for each of its group."""
+        alone = copy(self)
+        alone.shared = ()
+        super(Sharing, alone).format_options(ctx, formatter)
+        if self.shared:
+            with formatter.section(_("More, which `sprag {group} -h` explains", group=self.group)):
+                formatter.write_dl(
+                    [(option.get_help_record(ctx)[0], _first_part(option.help)) for option in self.shared]
+                )
+
+
+def _first_part(text: str) -> str:
     """The first part of the help of an option, which says what it is."""
-    text = _(" ".join((option.help or "").split()))
-    return _PART.split(text, maxsplit=1)[0]
+    return _PART.split(" ".join(text.split()), maxsplit=1)[0]
 
 
 class Groups(TyperGroup):
@@ -123,8 +156,14 @@ class Groups(TyperGroup):
         if ctx.parent is None:  # in a line that is completed they may stand anywhere, too
             front, rest = common_first(args)
             return super().parse_args(ctx, [*front, *rest])
-        place = next((place for place, word in enumerate(args) if word in self.commands), 0)
+        place = self.place(args) or 0
         return super().parse_args(ctx, [*args[place:], *args[:place]])
+
+    def place(self, args: Sequence[str]) -> int | None:
+        """Where the first command stands that is no value of an option before it; None where there is none."""
+        valued = {text for option in cast("Any", self).params if not option.is_flag for text in option.opts}
+        places = (place for place, word in enumerate(args) if word in self.commands)
+        return next((place for place in places if not place or args[place - 1] not in valued), None)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002 - typer's signature
         """Write the name and the first sentence of each command."""

@@ -7,13 +7,12 @@ from collections.abc import Iterable, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict
 from datetime import UTC, datetime
-from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
 from sprag_study.service.cli import completion
-from sprag_study.service.cli.common import names_service, wants_json
+from sprag_study.service.cli.common import CURRENT, names_service, wants_json
 from sprag_study.service.cli.configured import read_settings
 from sprag_study.service.cli.console import (
     ExitCode,
@@ -48,7 +47,8 @@ from sprag_study.service.cli.options import (
 from sprag_study.service.cli.remote import connection
 from sprag_study.service.cli.running import run_parsed
 from sprag_study.service.cli.sources import refuse_here
-from sprag_study.service.languages import N_, _, decimal
+from sprag_study.service.cli.stores import started_in
+from sprag_study.service.languages import ENGLISH, N_, _, decimal, language
 from sprag_study.worker.limits import MAX_BODY_BYTES
 
 if TYPE_CHECKING:
@@ -147,7 +147,7 @@ def _checked(
     from sprag_study.worker.chunking import Chunking
 
     left = None if finish is None else (finish - datetime.now(UTC)).total_seconds()
-    parsed = read_study(spec, points, partial(_with_start, settings) if stored else None, tables)
+    parsed = read_study(spec, points, started_in(settings.database_url) if stored else None, tables)
     chunking = Chunking(0, settings.pool_processes, settings.chunk_timeout)
     return preview_json(parsed, chunking, _reusable(settings, parsed) if stored else 0, left, _START_SECONDS)
 
@@ -259,7 +259,7 @@ def run(
     require_csv(header, decimal, written)
     require_report(appendix, written)
     settings = read_settings(database=db, processes=processes)
-    parsed = read_study(spec, points, partial(_with_start, settings) if db is not None else None, tables)
+    parsed = read_study(spec, points, started_in(db), tables)
     _say_warnings(parsed)
     start = time.monotonic()
     with (
@@ -315,19 +315,6 @@ def _done(record: StudyRecord, seconds: float, *, kept: bool) -> Iterator[str]:
         yield _("kept as {study}", study=record.id)
 
 
-def _with_start(settings: Settings, spec: object) -> object:
-    """The spec with the initial values of the case in the database from whose end it starts, if it names one."""
-    from sprag_study.service.jobs.start_from import with_start
-    from sprag_study.service.spec.machine.drive import START
-    from sprag_study.service.storage.store import Store
-
-    base = spec.get("base") if isinstance(spec, Mapping) else None
-    if not (isinstance(base, Mapping) and START in base):
-        return spec
-    with Store.open(settings.database_url, create=False) as store:
-        return with_start(store, spec)
-
-
 def _remark(now: Progress, finish_by: str | None) -> str:
     from sprag_study.service.results.rounds import sentence
 
@@ -379,5 +366,6 @@ def _rows(done: LocalRun, form: Format | ReportFormat, header: Header, appendix:
     if form == "html" or form == "pdf":  # noqa: PLR1714 - narrows the type
         settings = read_settings()
         asked = Choice(settings.units), ReportQuestion(appendix=appendix)
-        return iter([report_file(Library(done.store), done.record.id, *asked, Office.of(settings), form)])
+        with language(CURRENT.get().language or ENGLISH):  # as reports of `sprag export`
+            return iter([report_file(Library(done.store), done.record.id, *asked, Office.of(settings), form)])
     return export(stored(done.store, done.record, done.store.studies.study(done.record.id), header=header), form)

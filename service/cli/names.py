@@ -11,8 +11,8 @@ from sprag_study.service.faults import Fault
 from sprag_study.service.languages import N_, _
 
 if TYPE_CHECKING:
+    from sprag_study.service.answers.people import Token
     from sprag_study.service.client import Client
-    from sprag_study.service.storage.people.people import People
 
 
 def study_of(client: Client, text: str, *, deleted: bool = False) -> str:
@@ -31,14 +31,13 @@ def schedule_of(client: Client, text: str) -> str:
         return naming.schedule_of(client, text)
 
 
-def token_of(people: People, text: str) -> str:
+def token_of(tokens: Iterable[Token], text: str) -> str:
     """The id of the token that is meant, of one that is revoked by its id only; errors as of `study_of`."""
     from sprag_study.service.client.matching import Named, meant
 
     with _one("ID", text, _("the id or name of a token"), _("the token is not unique")):
-        now = people.clock.now()
-        tokens = [Named(t.id, t.name, f"{t.id} ({t.name})") for t in people.tokens() if not t.revoked_by(now)]
-        return meant(text, tokens, "tokens", "tk_")
+        named = [Named(t["id"], t["name"], f"{t['id']} ({t['name']})") for t in tokens if t["state"] != "revoked"]
+        return meant(text, named, "tokens", "tk_")
 
 
 def user_of(names: Iterable[str], text: str, where: str = "NAME") -> str:

@@ -80,7 +80,10 @@ StudyId = Annotated[
 CurveBy = Annotated[
     list[str] | None,
     typer.Option(
-        "--by", metavar="PATH", help="Axis with one curve for each value.", autocompletion=completion.parameters
+        "--by",
+        metavar="PATH",
+        help="Axis with one curve for each value; may be repeated.",
+        autocompletion=completion.parameters,
     ),
 ]
 Database = Annotated[
@@ -91,7 +94,11 @@ Database = Annotated[
 ]
 KeptIn = Annotated[
     str | None,
-    typer.Option("--db", metavar="URL", help="Database to keep the study in; default: a temporary database."),
+    typer.Option(
+        "--db",
+        metavar="URL",
+        help="Database to keep the study in; has the case at whose end a drive starts; default: a temporary one.",
+    ),
 ]
 Processes = Annotated[
     int | None, typer.Option("--processes", min=1, max=1024, help="Processes of the pool; default: one for each core.")
@@ -154,6 +161,15 @@ SHARED: Final[dict[str, Any]] = {
     ],
     "units": FileUnits,
     "decimal": CsvDecimal,
+    "by": CurveBy,
+    "at": Annotated[
+        list[str] | None,
+        typer.Option(
+            "--at",
+            metavar="PATH=VALUE",
+            help="Value at which an axis is held, SI or with a unit; `cases` lists those with it; may be repeated.",
+        ),
+    ],
     "case": CaseOption,
     "start": StartOption,
     "points_file": PointsFile,

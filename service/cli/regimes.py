@@ -5,7 +5,7 @@ from __future__ import annotations
 from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import show_table, table_words, write_json, wrong_option
 from sprag_study.service.cli.files import require_cases
-from sprag_study.service.cli.options import CaseOption, PointsFile, TableFiles
+from sprag_study.service.cli.options import CaseOption, KeptIn, PointsFile, TableFiles
 from sprag_study.service.cli.remote import study_named
 from sprag_study.service.cli.sources import SpecOrStudy
 from sprag_study.service.languages import N_, _
@@ -17,7 +17,13 @@ _SHOWN = (
 )  # fmt: skip
 
 
-def regimes(spec: SpecOrStudy, case: CaseOption = 0, points_file: PointsFile = None, tables: TableFiles = None) -> None:
+def regimes(
+    spec: SpecOrStudy,
+    case: CaseOption = 0,
+    points_file: PointsFile = None,
+    tables: TableFiles = None,
+    db: KeptIn = None,
+) -> None:
     """The regimes to which one case comes from its many starts, with their shares."""
     import numpy as np
 
@@ -25,7 +31,7 @@ def regimes(spec: SpecOrStudy, case: CaseOption = 0, points_file: PointsFile = N
     from sprag_study.worker.models.starts import has_starts
     from sprag_study.worker.reuse import taken
 
-    study = study_named(spec, points_file, tables).study
+    study = study_named(spec, points_file, tables, db).study
     require_cases(study, [case])
     if not has_starts(study.run):
         raise wrong_option(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
@@ -40,7 +40,7 @@ from sprag_study.service.cli.options import (
 )
 from sprag_study.service.cli.running import run_parsed
 from sprag_study.service.cli.sources import SpecOrStudy, is_study, refuse_local
-from sprag_study.service.cli.stores import require_store
+from sprag_study.service.cli.stores import require_store, started_in
 from sprag_study.service.faults import Fault, FaultError, Kind
 from sprag_study.service.languages import _, earlier
 from sprag_study.service.login import Access
@@ -150,31 +150,42 @@ def _option(parameter: object) -> str:
     return "--" + str(parameter).replace("_", "-")
 
 
-@contextmanager
 def opened(
     text: str, *, points: str | None = None, tables: list[str] | None = None, db: str | None = None,
     change: Callable[[object], object] | None = None, check: Callable[[ParsedSpec], None] | None = None,
     units: str | None = None, case: int | None = None, **of_spec: Any,
-) -> Iterator[tuple[Connection, str]]:  # fmt: skip
+) -> AbstractContextManager[tuple[Connection, str]]:  # fmt: skip
     """Who is asked about a study, and its id: a service, or the database in which the study of a spec is run first.
 
-    ``change`` completes the spec, ``check`` looks at its study before it is run, and so is refused what it has not of
-    ``units`` and ``case``; ``of_spec`` are further options that only a spec has.
+    The options are checked at once; a spec is run when the context is entered. ``change`` completes the spec, ``check``
+    looks at its study, and so is refused what it has not of ``units`` and ``case``; ``of_spec`` are further options
+    that only a spec has.
     """
     if is_study(text):
         refuse_local(**of_spec, points_file=points, tables=tables, db=db)
-        with connection() as client:
-            yield client, study_of(client, text)
-        return
+        return _asked(text)
     require_store(db)
-    parsed = read_study(text, points, change, tables)
+    parsed = read_study(text, points, started_in(db, change), tables)
     say(*warning_lines(parsed.warnings))
     if units is not None:
         _reading(parsed, units)
-    if case is not None and parsed.study.plan is None:  # otherwise the study chooses its cases
-        require_cases(parsed.study, [case])
+    if case is not None:
+        from sprag_study.worker.planning import most_cases
+
+        require_cases(parsed.study, [case], most_cases(parsed.study))
     if check is not None:
         check(parsed)
+    return _run(parsed, db)
+
+
+@contextmanager
+def _asked(text: str) -> Iterator[tuple[Connection, str]]:
+    with connection() as client:
+        yield client, study_of(client, text)
+
+
+@contextmanager
+def _run(parsed: ParsedSpec, db: str | None) -> Iterator[tuple[Connection, str]]:
     from sprag_study.service.here import Here
 
     settings = read_settings(database=db)
@@ -263,14 +274,18 @@ def state(
         show_study(client.request("GET", study_path(study_of(client, study_id))))
 
 
-def study_named(text: str, points: str | None, tables: list[str] | None) -> ParsedSpec:
-    """The checked study of a spec file, as `read_study` gives it, or of a study of the service, to be run here."""
+def study_named(text: str, points: str | None, tables: list[str] | None, db: str | None = None) -> ParsedSpec:
+    """The checked study of a spec file, as `read_study` gives it, or of a study of the service, to be run here.
+
+    ``db`` is the database with the case from whose end the drive of a spec starts.
+    """
     from sprag_study.service.client.wire import study_path
     from sprag_study.service.spec.document import parse_spec
 
     if not is_study(text):
-        return read_study(text, points, files=tables)
-    refuse_local(points_file=points, tables=tables)
+        require_store(db)
+        return read_study(text, points, started_in(db), tables)
+    refuse_local(points_file=points, tables=tables, db=db)
     with connection() as client:
         return parse_spec(client.request("GET", study_path(study_of(client, text)))["spec"])
 

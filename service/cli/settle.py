@@ -21,7 +21,7 @@ from sprag_study.service.cli.console import (
 )
 from sprag_study.service.cli.file_formats import require_csv
 from sprag_study.service.cli.files import output, require_cases, to_file
-from sprag_study.service.cli.options import CsvDecimal, OutputFile, PointsFile, TableFiles
+from sprag_study.service.cli.options import CsvDecimal, KeptIn, OutputFile, PointsFile, TableFiles
 from sprag_study.service.cli.remote import study_named
 from sprag_study.service.cli.sources import SpecOrStudy
 from sprag_study.service.json_text import to_bytes
@@ -48,6 +48,7 @@ def settle(
     ] = None,
     points_file: PointsFile = None,
     tables: TableFiles = None,
+    db: KeptIn = None,
     file: OutputFile = None,
     decimal: CsvDecimal = None,
     at_most: Annotated[
@@ -67,7 +68,7 @@ def settle(
 
     in_json = wants_json() or (file or "").lower().endswith(".json")
     require_csv(None, decimal, "json" if in_json else "csv")
-    study = _settled(study_named(spec, points_file, tables).study, at_most)
+    study = _settled(study_named(spec, points_file, tables, db).study, at_most)
     cases = _chosen(study, case)
     with output(file) as write:
         blocks = _blocks(study, cases)

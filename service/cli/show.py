@@ -26,7 +26,7 @@ class _Views(Groups):
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Put the view first; without one the study itself is meant."""
         ctx.meta[_NAMED] = bool(args)
-        place = next((place for place, word in enumerate(args) if word in self.commands), None)
+        place = self.place(args)
         if place is None:
             itself = args and not args[0].startswith("-") and not ctx.resilient_parsing
             if itself and args[1:] and not args[1].startswith("-"):
@@ -53,8 +53,8 @@ class _Views(Groups):
 
 app = typer.Typer(
     help="Show a study: its state, or a view of it or of one of its cases.\n\nA spec is run here first. "
-    "`sprag show WHAT -h` lists which of the options below a view has: --units and --db are of a study and of `case`, "
-    "--case and --start of one case.",
+    "`sprag show WHAT -h` lists which of the options below a view has: --units is of a study and of `case`, --by and "
+    "--at are of views with axes, --case and --start of one case.",
     no_args_is_help=True,
     cls=_Views,
     options_metavar="SPEC|ID",

@@ -358,19 +358,24 @@ def show_cases(found: dict[str, Any]) -> None:
 
 
 def show_calibration(found: dict[str, Any]) -> None:
-    """Values with their intervals, correlations, and what to do next."""
+    """Values with their intervals, correlations, and what to do next; for programs one table with all numbers."""
     heads = (_("parameter"), _("value"), _("from"), _("to"), _("deviation"))
     columns = [(head, place > 0) for place, head in enumerate(heads)]
-    rows = []
+    rows: list[tuple[object, ...]] = []
     for one in found["parameters"]:
         numbers = (one["value"], *(one["interval"] or (None, None)), one["deviation"])
         rows.append((heading(one["name"], one["unit"]), *(in_unit(number, one["unit"]) for number in numbers)))
-    show_table(_("Values and 95 % intervals"), columns, rows)
+    names = [one["name"] for one in found["parameters"]]
+    correlations = (found["correlations"] or []) if len(names) > 1 else []
     if piped():  # a table has its sentences beside it
+        if correlations:
+            columns += [(f"{_('correlation')} {name}", True) for name in names]
+            rows = [(*row, *line) for row, line in zip(rows, correlations, strict=True)]
+        show_table("", columns, rows)
         say(*found["sentences"])
         return
-    if found["correlations"] and len(rows) > 1:
-        names = [one["name"] for one in found["parameters"]]
-        lines = [(name, *row) for name, row in zip(names, found["correlations"], strict=True)]
+    show_table(_("Values and 95 % intervals"), columns, rows)
+    if correlations:
+        lines = [(name, *row) for name, row in zip(names, correlations, strict=True)]
         show_table(_("Correlations"), [("", False), *((name.replace(".", ".\n"), True) for name in names)], lines)
     write_text("".join(f"{sentence}\n" for sentence in found["sentences"]))

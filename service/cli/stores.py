@@ -4,6 +4,7 @@ every answer names it."""
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,7 @@ from sprag_study.service.languages import N_, _
 from sprag_study.service.login import profile
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from sprag_study.service.storage.store import Store
 
@@ -86,6 +87,28 @@ def require_store(db: str | None) -> None:
 
     if db is not None:
         Store.open(_present(db), create=False).close()
+
+
+def started_in(db: str | None, change: Callable[[object], object] | None = None) -> Callable[[object], object] | None:
+    """What completes a spec: ``change``, then the state at the end of the case of a database (``db``, the option) from
+    which its drive starts.
+    """
+    if db is None:
+        return change
+
+    def completed(spec: object) -> object:
+        from sprag_study.service.jobs.start_from import with_start
+        from sprag_study.service.spec.machine.drive import START
+        from sprag_study.service.storage.store import Store
+
+        whole = spec if change is None else change(spec)
+        base = whole.get("base") if isinstance(whole, Mapping) else None
+        if not (isinstance(base, Mapping) and START in base):
+            return whole
+        with Store.open(read_settings(database=db).database_url, create=False) as store:
+            return with_start(store, whole)
+
+    return completed
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from sprag_study.service.cli.case_views import naming_options, say_file
+from sprag_study.service.cli.case_views import before_run, say_file
 from sprag_study.service.cli.common import wants_json
 from sprag_study.service.cli.console import WrongInputError, piped, table_words, write_json, write_table, wrong_option
 from sprag_study.service.cli.described import option, parameter, query_of, signed
@@ -163,12 +163,16 @@ def _check(
     about: ViewInfo, asked: tuple[NamedSetting, ...], settings: dict[str, Any], parsed: ParsedSpec
 ) -> None:  # fmt: skip
     """Refuse what the study of a spec cannot be asked before it is run; WrongInputError."""
+    from sprag_study.service.results.selection import numeric_results
     from sprag_study.service.views.studies import STUDY_VIEWS
+    from sprag_study.worker.models import study_results
 
     view = STUDY_VIEWS[about.name]
-    with naming_options(parsed.study, asked, ""):
-        if parsed.study.plan is None:  # otherwise the cases that it chooses decide what can be asked
-            view.check(parsed.study, view.choose(parsed.study, about.question(**settings)))
+    with before_run(parsed.study, asked):
+        for one in asked:
+            if one.setting.metavar == "RESULT" and (names := settings[one.name]):
+                numeric_results(study_results(parsed.study), one.alias, [names] if isinstance(names, str) else names)
+        view.check(parsed.study, view.choose(parsed.study, about.question(**settings)))
 
 
 #: The commands by name.

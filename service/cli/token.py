@@ -1,28 +1,21 @@
-"""``sprag admin token``: create, list and revoke tokens."""
+"""``sprag admin token``: create, list and revoke tokens, of a service or of a database."""
 
 from __future__ import annotations
 
 import secrets
-from datetime import UTC, timedelta
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import Annotated, Final
 
 import typer
 
 from sprag_study.service.cli import completion
 from sprag_study.service.cli.common import wants_json
-from sprag_study.service.cli.configured import read_settings
-from sprag_study.service.cli.console import WrongInputError, agreed, say, show_table, table_words, write_json
+from sprag_study.service.cli.console import agreed, say, show_table, table_words, time_text, write_json
 from sprag_study.service.cli.groups import Groups
 from sprag_study.service.cli.names import token_of, user_of
 from sprag_study.service.cli.options import Database
-from sprag_study.service.cli.user import users_of
+from sprag_study.service.cli.user import names_of, users_at
 from sprag_study.service.languages import N_, _
-from sprag_study.service.storage.people.scopes import TokenScope, TokenState, token_name
-
-if TYPE_CHECKING:
-    from datetime import datetime
-
-    from sprag_study.service.storage.people.people import TokenRecord
+from sprag_study.service.storage.people.scopes import MOST_DAYS, TokenScope, TokenState, token_name
 
 _STATES: Final = {
     TokenState.VALID: N_("valid"),
@@ -62,49 +55,47 @@ def create(
             "--user",
             metavar="NAME",
             help="User to whom the token belongs; default: none.",
-            autocompletion=completion.stored_users,
+            autocompletion=completion.users,
         ),
     ] = None,
     expires: Annotated[
         int | None,
         typer.Option(
-            "--expires", metavar="DAYS", min=1, max=36_500, help="Days for which it is valid; default: always."
+            "--expires", metavar="DAYS", min=1, max=MOST_DAYS, help="Days for which it is valid; default: always."
         ),
     ] = None,
     db: Database = None,
 ) -> None:
     """Create a token and print it; only its digest is stored, so it cannot be shown again."""
-    with users_of(db) as store:
-        ends = None if expires is None else store.clock.now() + timedelta(days=expires)
-        owner = None if user is None else user_of([known.name for known in store.people.users()], user, "--user")
-        store.people.most_tokens = read_settings().user_tokens
-        secret, record = store.people.create_token(token_name(name, "--name"), scope, owner=owner, expires_at=ends)
+    with users_at(db) as (people, where):
+        name = token_name(name, "--name")
+        owner = None if user is None else user_of(names_of(people), user, "--user")
+        made = people.create_token(name, user=owner, scope=scope.value, days=expires)
     if wants_json():
-        write_json({"database": store.session.location, "token": secret, **_json(record)})
-    else:
-        print(secret)
-        said = _("It is shown only once; every request to a service of this database now needs a token.")
-        say(f"{record.id}: {record.name}, {record.scope}. {said}")
+        write_json({**where, **made})
+        return
+    print(made["token"])
+    once = _("It is shown only once; every request to a service of this database now needs a token.")
+    say(f"{made['id']}: {made['name']}, {made['scope']}. {_('It is shown only once.') if 'server' in where else once}")
 
 
 @app.command("list")
 def list_tokens(db: Database = None) -> None:
     """List all tokens with owner, state, expiry and last use, newest first, without their secrets."""
-    with users_of(db) as store:
-        now, users = store.clock.now(), {user.name: user for user in store.people.users()}
-        records = store.people.tokens()
-    states = [record.state_at(now, users.get(record.owner or "")) for record in records]
-    found = [{**_json(record), "state": state.value} for record, state in zip(records, states, strict=True)]
+    with users_at(db) as (people, where):
+        listed = people.tokens()
     if wants_json():
-        write_json({"database": store.session.location, "tokens": found})
+        write_json({**where, "tokens": listed})
         return
-    fields = ("id", "name", "user", "scope", "state", "created_at", "expires_at", "used_at", "revoked_at")
     with table_words():
         times = (_("created"), _("expires"), _("used"), _("revoked"))
         heads = (_("id"), _("name"), _("user"), _("scope"), _("state"), *times)
         columns = [(head, False, place == 0) for place, head in enumerate(heads)]
-        words = {state.value: _(_STATES[state]) for state in TokenState}
-        rows = [[words[t[field]] if field == "state" else t[field] for field in fields] for t in found]
+        rows = []
+        for it in listed:
+            moments = (it["created_at"], it["expires_at"], it["used_at"], it["revoked_at"])
+            state = _(_STATES[TokenState(it["state"])])
+            rows.append((it["id"], it["name"], it["user"], it["scope"], state, *map(time_text, moments)))
         show_table("", columns, rows)
 
 
@@ -122,36 +113,15 @@ def revoke(
     db: Database = None,
 ) -> None:
     """Revoke a token and end the browser sessions that it started, within two seconds; asks at a terminal."""
-    from sprag_study.service.storage.errors import TokenNotFoundError
-
-    with users_of(db) as store:
-        known = token_of(store.people, token_id)
-        name = next((record.name for record in store.people.tokens() if record.id == known), known)
+    with users_at(db) as (people, where):
+        listed = people.tokens()
+        known = token_of(listed, token_id)
+        name = next((it["name"] for it in listed if it["id"] == known), known)
         if not agreed(_("Revoke the token {name} ({token})?", name=name, token=known), yes=yes):
             say(_("nothing is revoked"))
             return
-        try:
-            record = store.people.revoke_token(known)
-        except TokenNotFoundError as error:
-            raise WrongInputError("token-not-found", str(error)) from error
+        gone = people.revoke_token(known)
     if wants_json():
-        write_json({"database": store.session.location, **_json(record)})
+        write_json({**where, **gone})
     else:
-        say(_("{token} ({name}) is revoked", token=record.id, name=record.name))
-
-
-def _json(record: TokenRecord) -> dict[str, Any]:
-    return {
-        "id": record.id,
-        "name": record.name,
-        "user": record.owner,
-        "scope": record.scope.value,
-        "created_at": _text(record.created_at),
-        "expires_at": _text(record.expires_at),
-        "used_at": _text(record.used_at),
-        "revoked_at": _text(record.revoked_at),
-    }
-
-
-def _text(moment: datetime | None) -> str | None:
-    return None if moment is None else moment.astimezone(UTC).isoformat(timespec="seconds").replace("+00:00", "Z")
+        say(_("{token} ({name}) is revoked", token=gone["id"], name=gone["name"]))

@@ -12,6 +12,7 @@ import typer
 from sprag_study.service.actor import Role
 from sprag_study.service.cli import completion
 from sprag_study.service.cli.common import wants_json
+from sprag_study.service.cli.configured import read_settings
 from sprag_study.service.cli.console import (
     CommandFailureError,
     WrongInputError,
@@ -33,7 +34,7 @@ from sprag_study.service.storage.people.scopes import require_one_limit, user_na
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
 
-    from sprag_study.service.answers.people import HandedOver, User
+    from sprag_study.service.answers.people import CreatedToken, HandedOver, Token, User
     from sprag_study.service.storage.store import Store
 
 app = typer.Typer(
@@ -83,7 +84,7 @@ class Limit(StrEnum):
 
 
 #: Options whose parameter of the same name can be at fault.
-_OPTIONS: Final = frozenset({*Limit, "to"})
+_OPTIONS: Final = frozenset({*Limit, "to", "--name"})
 
 AsSet = Annotated[
     list[Limit] | None,
@@ -156,7 +157,7 @@ def change(
     with users_at(db) as (users, where):
         limits = _limits(cases, storage, checks, as_set or ())
         fields = {} if role is None else {"role": str(role)}
-        user = users.change_user(user_of(_names(users), name), **fields, **limits)
+        user = users.change_user(user_of(names_of(users), name), **fields, **limits)
     _show(where, user, _("{name} is changed: {role}", name=user["name"], role=user["role"]))
 
 
@@ -164,7 +165,7 @@ def change(
 def remove(name: Known, db: Database = None) -> None:
     """Remove a user, whose tokens and sessions end within two seconds; studies and schedules are kept."""
     with users_at(db) as (users, where):
-        user = users.change_user(user_of(_names(users), name), removed=True)
+        user = users.change_user(user_of(names_of(users), name), removed=True)
     _show(
         where,
         user,
@@ -201,7 +202,7 @@ def hand_over(
 ) -> None:
     """Give the studies and schedules of one user to another."""
     with users_at(db) as (users, where):
-        names = _names(users)
+        names = names_of(users)
         name, to = user_of(names, name), user_of(names, to, "--to")
         counts = users.hand_over_user(name, to)
     if wants_json():
@@ -211,7 +212,7 @@ def hand_over(
 
 
 class Users(Protocol):
-    """The users of a service, or of a database."""
+    """The users and tokens of a service, or of a database."""
 
     def users(self) -> list[User]:
         """Every user, by name."""
@@ -224,6 +225,17 @@ class Users(Protocol):
 
     def hand_over_user(self, name: str, to: str) -> HandedOver:
         """Give what belongs to a user to another."""
+
+    def tokens(self) -> list[Token]:
+        """Every token, newest first."""
+
+    def create_token(
+        self, name: str, *, user: str | None = ..., scope: str = ..., days: int | None = ...
+    ) -> CreatedToken:
+        """Create a token."""
+
+    def revoke_token(self, token_id: str) -> Token:
+        """Revoke a token."""
 
 
 @contextmanager
@@ -238,13 +250,14 @@ def users_at(db: str | None) -> Iterator[tuple[Users, dict[str, str]]]:
     from sprag_study.service.jobs.users import StoredUsers
 
     with users_of(db) as store:
+        store.people.most_tokens = read_settings().user_tokens
         yield StoredUsers(store.people), {"database": store.session.location}
 
 
 @contextmanager
 def users_of(db: str | None) -> Iterator[Store]:
     """The store of a database; an unknown user, one who exists already, and a wrong name are wrong input."""
-    from sprag_study.service.storage.errors import UserExistsError, UserNotFoundError
+    from sprag_study.service.storage.errors import TokenNotFoundError, UserExistsError, UserNotFoundError
 
     with _naming_options(), named_store(db) as store:
         try:
@@ -253,6 +266,8 @@ def users_of(db: str | None) -> Iterator[Store]:
             raise WrongInputError("user-not-found", str(error)) from error
         except UserExistsError as error:
             raise WrongInputError("user-exists", str(error)) from error
+        except TokenNotFoundError as error:
+            raise WrongInputError("token-not-found", str(error)) from error
 
 
 @contextmanager
@@ -278,7 +293,8 @@ def _limits(
     return {f"most_{name}": number for name, number in {**given, **dict.fromkeys(again)}.items()}
 
 
-def _names(users: Users) -> list[str]:
+def names_of(users: Users) -> list[str]:
+    """The names of all users."""
     return [user["name"] for user in users.users()]
 
 

@@ -201,6 +201,11 @@ def user_path(name: str) -> str:
     return f"/users/{_quoted('name', name)}"
 
 
+def token_path(token_id: str, action: str) -> str:
+    """Address of what is done with a token under the API."""
+    return f"/tokens/{_quoted('token_id', token_id)}{action}"
+
+
 def schedule_path(schedule_id: str) -> str:
     """Address of a schedule under the API."""
     return f"/schedules/{_quoted('schedule_id', schedule_id)}"

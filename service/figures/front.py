@@ -14,8 +14,12 @@ from sprag_study.service.reading.reader import Phrase, plural
 from sprag_study.service.results.fronts import history, worst_of
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from sprag_study.service.results.fronts import Designs
     from sprag_study.worker.arrays import Bools, Floats
+    from sprag_study.worker.models import ResultInfo
+    from sprag_study.worker.planning.goals.plan import GoalPlan
 
 #: The number of a design, as an axis.
 NUMBER: Final = "design"
@@ -26,23 +30,35 @@ _FEW: Final = 5
 _NOTHING: Final = Phrase("No design has its results yet.")
 
 
+def names_of(plan: GoalPlan, infos: Mapping[str, ResultInfo]) -> list[str]:
+    """What a design can be drawn over: goals first, then variables, numeric results of limits, and its number."""
+    limited = [limit.name for limit in plan.subject_to if infos[limit.name].kind != "category"]
+    return list(
+        dict.fromkeys([*(goal.name for goal in plan.best), *(one.paths[0] for one in plan.vary), *limited, NUMBER])
+    )
+
+
 def quantities(found: Designs) -> dict[str, tuple[str, Floats]]:
-    """What a design can be drawn over, by name: unit and values; goals first, then variables, results of limits."""
-    names = [goal.name for goal in found.plan.best]
-    shown = {name: (found.infos[name].unit, found.front.goals[:, index]) for index, name in enumerate(names)}
-    for index, one in enumerate(found.plan.vary):
-        shown[one.paths[0]] = (unit_of(found.study, one.paths[0]), found.front.variables[:, index])
-    for limit in found.plan.subject_to:
-        info = found.infos[limit.name]
-        if info.kind != "category" and info.name not in shown:
-            shown[info.name] = (info.unit, worst_of(limit, found.values[info.name]))
-    return {**shown, NUMBER: ("1", found.numbers.astype(np.float64))}
+    """The unit and the values of what a design can be drawn over, by name."""
+    goals = {goal.name: index for index, goal in enumerate(found.plan.best)}
+    variables = {one.paths[0]: index for index, one in enumerate(found.plan.vary)}
+    limits = {limit.name: limit for limit in found.plan.subject_to}
+
+    def of(name: str) -> tuple[str, Floats]:
+        if name in variables:
+            return unit_of(found.study, name), found.front.variables[:, variables[name]]
+        if name == NUMBER:
+            return "1", found.numbers.astype(np.float64)
+        values = found.front.goals[:, goals[name]] if name in goals else worst_of(limits[name], found.values[name])
+        return found.infos[name].unit, values
+
+    return {name: of(name) for name in names_of(found.plan, found.infos)}
 
 
-def chosen(found: Designs, x: str | None, y: str | None) -> tuple[str, str]:
+def chosen(plan: GoalPlan, infos: Mapping[str, ResultInfo], x: str | None, y: str | None) -> tuple[str, str]:
     """Names of the two quantities; by default the first two goals. Raises SelectionError for an unknown name."""
-    names = list(quantities(found))
-    goals = [goal.name for goal in found.plan.best]
+    names = names_of(plan, infos)
+    goals = [goal.name for goal in plan.best]
     first, second = [*goals, NUMBER, names[0]][:2] if len(goals) != 1 else (NUMBER, goals[0])
     for parameter, name in (("x", x), ("y", y)):
         if name is not None and name not in names:
@@ -55,7 +71,7 @@ def chosen(found: Designs, x: str | None, y: str | None) -> tuple[str, str]:
 
 def front_figure(found: Designs, x: str | None = None, y: str | None = None) -> Figure:
     """Every design as a point: on the front, feasible, or outside the limits (grey). Nothing joins them."""
-    first, second = chosen(found, x, y)
+    first, second = chosen(found.plan, found.infos, x, y)
     known = quantities(found)
     (x_unit, xs), (y_unit, ys) = known[first], known[second]
     ranked = found.front

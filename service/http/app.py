@@ -230,6 +230,7 @@ class Application(FastAPI):
                 "ScheduleRequest": SCHEDULE.schema(),
                 "ScheduleChange": SCHEDULE_CHANGE.schema(),
                 "NewUser": user_records.USER.schema(),
+                "NewToken": user_records.TOKEN.schema(),
                 "UserChange": user_records.CHANGE.schema(),
                 "HandOver": user_records.HAND_OVER.schema(),
             }

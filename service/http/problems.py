@@ -54,6 +54,7 @@ PROBLEM_TYPES: dict[Kind, ProblemType] = _catalogue(
     _P("schedule-not-found", 404, "Schedule not found", "It never existed or was deleted."),
     _P("component-not-found", 404, "Component not found", "It never existed or was deleted."),
     _P("view-not-found", 404, "Saved view not found", "It never existed, or was deleted itself or with its study."),
+    _P("token-not-found", 404, "Token not found", "The ids of tokens are at /api/v1/tokens, for administrators."),
     _P("user-not-found", 404, "User not found", "The names of users are at /api/v1/users, for administrators."),
     _P("case-not-found", 404, "Case not found", "Cases are numbered from 0."),
     _P("not-found", 404, "There is nothing at this address", "The addresses of the interface are at /help/interface."),

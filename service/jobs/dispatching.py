@@ -128,7 +128,7 @@ def _cluster(settings: WorkerSettings, *, renew: bool = False) -> Executor:
     try:
         from sprag_study.worker.executors.dask import DaskExecutor
     except ImportError:
-        raise ExecutorError("Dask is not installed: pip install 'sprag-study[cluster]'") from None
+        raise ExecutorError('Dask is not installed: pip install "sprag-study[cluster]"') from None
     url = settings.executor if "://" in settings.executor else ""
     return DaskExecutor(url, settings.processes, chunk_timeout=settings.chunk_timeout, renew=renew)
 

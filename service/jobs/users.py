@@ -1,25 +1,33 @@
-"""Users as administrators list and change them: by the interface for programs, and by commands on the database."""
+"""Users and tokens as administrators list and change them: by the interface for programs, and by commands on the
+database.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from datetime import timedelta
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag_study.service.actor import Role
 from sprag_study.service.answers import filled
-from sprag_study.service.answers.people import HandedOver, QuotaUse, User
+from sprag_study.service.answers.people import CreatedToken, HandedOver, QuotaUse, Token, User
 from sprag_study.service.faults import FaultError
 from sprag_study.service.spec.described import Described, Record
 from sprag_study.service.spec.node import Node
 from sprag_study.service.spec.report import Report
 from sprag_study.service.storage.people.people import Quota
-from sprag_study.service.storage.people.scopes import MAX_USER_NAME, user_name
+from sprag_study.service.storage.people.scopes import MAX_USER_NAME, MOST_DAYS, TokenScope, token_name, user_name
+from sprag_study.worker.limits import MAX_NAME_LENGTH
 
 if TYPE_CHECKING:
-    from sprag_study.service.storage.people.people import People, UserRecord
+    from sprag_study.service.storage.people.people import People, TokenRecord, UserRecord
 
 _NAME: Final[dict[str, Any]] = {"type": "string", "minLength": 1, "maxLength": MAX_USER_NAME}
 _ROLE: Final = Described("role", "", "what the user may do", "choice", choices=tuple((role, "") for role in Role))
+_SCOPE: Final = Described(
+    "scope", "", "read everything, or change it too", "choice", choices=tuple((scope, "") for scope in TokenScope)
+)
 _REMOVED: Final = Described("removed", "", "whether the user may no longer use the service", "flag")
 #: The limits of a user: what each limits, its name in a quota, and the highest one.
 _LIMITS: Final = {
@@ -39,6 +47,19 @@ USER: Final = Record({"name": _NAME, "role": _ROLE, **_SCHEMAS}, "A user to add.
 CHANGE: Final = Record(
     {"role": _ROLE, "removed": _REMOVED, **_SCHEMAS}, "The fields of a user to change; what is left out is kept."
 )
+TOKEN: Final = Record(
+    {
+        "name": {"type": "string", "minLength": 1, "maxLength": MAX_NAME_LENGTH, "description": "owner or purpose"},
+        "scope": _SCOPE,
+        "user": {"type": ["string", "null"], "description": "whose it is; null: nobody's, with the role of a designer"},
+        "days": {
+            "type": ["integer", "null"], "minimum": 1, "maximum": MOST_DAYS,
+            "description": "days for which it is valid; null: always",
+        },
+    },
+    "A token to create.",
+    required=("name",),
+)  # fmt: skip
 HAND_OVER: Final = Record(
     {"name": _NAME, "to": _NAME}, "Two users: to the second belongs what was the first's.", required=("name", "to")
 )
@@ -51,6 +72,16 @@ class NewUser:
     name: str
     role: Role
     quota: Quota
+
+
+@dataclass(frozen=True, slots=True)
+class NewToken:
+    """A token to create; ``days`` is None where it is valid always."""
+
+    name: str
+    scope: TokenScope
+    owner: str | None
+    days: int | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +114,18 @@ def read_user_change(data: object) -> UserChange:
     return UserChange(None if role is None else Role(role), removed, quota, as_set)
 
 
+def read_token(data: object) -> NewToken:
+    """The token that a request creates; raises SpecError with every fault."""
+    node = Node(Report(data), "", data)
+    TOKEN.read(node)
+    name = _read_name(node["name"], token_name, "must be the name of a token")
+    scope = _SCOPE.read(node) if "scope" in node else TokenScope.WRITE
+    owner = _read_name(node["user"]) if node["user"].value is not None else None
+    days = node["days"].whole(1, MOST_DAYS) if node["days"].value is not None else None
+    node.report.raise_if_any()
+    return NewToken(name, TokenScope(scope), owner, days)
+
+
 def read_hand_over(data: object) -> tuple[str, str]:
     """The names of who has it and of who gets it; raises SpecError with every fault."""
     node = Node(Report(data), "", data)
@@ -92,12 +135,12 @@ def read_hand_over(data: object) -> tuple[str, str]:
     return names
 
 
-def _read_name(node: Node) -> str:
+def _read_name(node: Node, named: Callable[[str], str] = user_name, mistake: str = "must be the name of a user") -> str:
     if not isinstance(node.value, str):
-        node.mistake("must be the name of a user")
+        node.mistake(mistake)
         return ""
     try:
-        return user_name(node.value)
+        return named(node.value)
     except FaultError as error:
         fault = error.faults[0]
         node.refuse("invalid-text", fault.message, allowed=fault.allowed)
@@ -135,8 +178,14 @@ def user_json(people: People, record: UserRecord) -> User:
     return filled(User, record, quota=quota_json(people, record.name, record.quota), **own)
 
 
+def token_json(people: People, record: TokenRecord) -> Token:
+    """A token as JSON data."""
+    owner = next((user for user in people.users() if user.name == record.owner), None)
+    return filled(Token, record, user=record.owner, state=record.state_at(people.clock.now(), owner).value)
+
+
 class StoredUsers:
-    """The users of a database; its methods are those of the client of a service."""
+    """The users and tokens of a database; its methods are those of the client of a service."""
 
     def __init__(self, people: People) -> None:
         self._people = people
@@ -156,6 +205,30 @@ class StoredUsers:
     def hand_over_user(self, name: str, to: str) -> HandedOver:
         """Give what belongs to a user to another; raises as `People.hand_over`."""
         return handed_over(self._people, name, to)
+
+    def tokens(self) -> list[Token]:
+        """Every token, newest first."""
+        return [token_json(self._people, record) for record in self._people.tokens()]
+
+    def create_token(self, name: str, **fields: Any) -> CreatedToken:
+        """Create a token; raises SpecError, and as `People.create_token`."""
+        return created(self._people, read_token({"name": name, **fields}))
+
+    def revoke_token(self, token_id: str) -> Token:
+        """Revoke a token; raises TokenNotFoundError."""
+        return revoked(self._people, token_id)
+
+
+def created(people: People, token: NewToken) -> CreatedToken:
+    """Create a token; raises as `People.create_token`."""
+    ends = None if token.days is None else people.clock.now() + timedelta(days=token.days)
+    secret, record = people.create_token(token.name, token.scope, owner=token.owner, expires_at=ends)
+    return {**token_json(people, record), "token": secret}
+
+
+def revoked(people: People, token_id: str) -> Token:
+    """Revoke a token; raises TokenNotFoundError."""
+    return token_json(people, people.revoke_token(token_id))
 
 
 def added(people: People, user: NewUser) -> User:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from sprag_study.service.answers import goals as m
+from sprag_study.service.figures.front import chosen as drawn_over
 from sprag_study.service.figures.front import front_figure
 from sprag_study.service.figures.pictures import MAX_PICTURE_POINTS, check_size
 from sprag_study.service.formats import Picture
-from sprag_study.service.results.fronts import Designs, front_csv, front_json, goal_of
+from sprag_study.service.results.fronts import Designs, front_csv, front_json, goal_of, infos_of
 from sprag_study.service.views import study_view
 from sprag_study.service.views.study_questions import FRONT, FrontQuestion
 from sprag_study.service.views.study_view import StudyAnswer, StudyView
@@ -34,6 +35,11 @@ class FrontView(StudyView[FrontQuestion, FrontQuestion, Designs]):
         """The question; FaultError where the study has no goal."""
         goal_of(study)
         return question
+
+    def check(self, study: Study, chosen: FrontQuestion) -> None:
+        """The quantities of a picture."""
+        plan = goal_of(study)
+        drawn_over(plan, infos_of(study, plan), chosen.x, chosen.y)
 
     def small(self, study: Study, chosen: FrontQuestion) -> bool:
         """By the cases of the study: ranking takes a time that grows faster than their number."""

@@ -102,7 +102,7 @@ def test_a_missing_extra_is_said_and_the_service_goes_on(
         monkeypatch.delitem(sys.modules, "opentelemetry.exporter.otlp.proto.http.trace_exporter")
         for _ in range(2):  # two chunks: the import is not tried again
             traces.start(soon=True)
-    assert caplog.text.count("pip install 'sprag-study[traces]'") == 1
+    assert caplog.text.count('pip install "sprag-study[traces]"') == 1
     assert traces.provider() is None
 
 

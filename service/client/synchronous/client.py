@@ -17,6 +17,7 @@ from sprag_study.service.client.wire import (
     preset_path,
     schedule_path,
     study_path,
+    token_path,
     user_path,
     view_path,
 )
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 
     from sprag_study.service.answers.catalogue import Health, Model, Preset
     from sprag_study.service.answers.components import ComponentEntry
-    from sprag_study.service.answers.people import AuditEntry, HandedOver, Me, User
+    from sprag_study.service.answers.people import AuditEntry, CreatedToken, HandedOver, Me, Token, User
     from sprag_study.service.answers.saved_views import SavedViewEntry
     from sprag_study.service.answers.schedules import Night, ScheduleDetail, ScheduleSummary
     from sprag_study.service.answers.studies import ClutchFitReport, Preview
@@ -341,6 +342,31 @@ class Client(Connection):
     def hand_over_user(self, name: str, to: str) -> HandedOver:
         """Give the studies, schedules, components and views of a user to another; for administrators."""
         return cast("HandedOver", self.request("POST", "/users:hand-over", json={"name": name, "to": to}))
+
+    def tokens(self) -> list[Token]:
+        """Every token without its secret, newest first; for administrators."""
+        return cast("list[Token]", (self.request("GET", "/tokens"))["tokens"])
+
+    def create_token(
+        self, name: str, *, user: str | None = None, scope: str = "write", days: int | None = None
+    ) -> CreatedToken:
+        """Create a token, whose secret is the field ``token`` of this answer only; for administrators.
+
+        Parameters
+        ----------
+        user : str or None
+            Whose it is; None: nobody's.
+        scope : str
+            "read" or "write".
+        days : int or None
+            For which it is valid; None: always.
+        """
+        fields = {"name": name, "user": user, "scope": scope, "days": days}
+        return cast("CreatedToken", self.request("POST", "/tokens", json=fields))
+
+    def revoke_token(self, token_id: str) -> Token:
+        """Revoke a token by its id; for administrators."""
+        return cast("Token", self.request("POST", token_path(token_id, ":revoke")))
 
     def audit(
         self,

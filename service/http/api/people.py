@@ -1,4 +1,4 @@
-"""Who asks; users and the audit log, for administrators."""
+"""Who asks; users, tokens and the audit log, for administrators."""
 
 from __future__ import annotations
 
@@ -53,6 +53,10 @@ CHANGES: Final[dict[str, Any]] = {
     "another role, and the checks of the settings": {"role": "viewer", "most_checks": None},
     "out": {"removed": True},
     "in again": {"removed": False},
+}
+NEW_TOKENS: Final[dict[str, Any]] = {
+    "of a user, for a year": {"name": "laptop", "user": "dora@example.com", "days": 365},
+    "to read metrics": {"name": "monitoring", "scope": "read"},
 }
 HAND_OVERS: Final[dict[str, Any]] = {"to a colleague": {"name": "dora@example.com", "to": "emil@example.com"}}
 
@@ -124,6 +128,40 @@ async def hand_over_user(context: Ctx, request: Request, work: Attended, receive
     return await _changed(
         request, users.handed_over, context.store.people, *await work.read(users.read_hand_over, received)
     )
+
+
+@router.get("/tokens", response_model=m.TokenList, responses=problems("invalid-parameter", "not-allowed"))
+def list_tokens(context: Ctx) -> Response:
+    """Every token without its secret, newest first, for administrators."""
+    return json_response({"tokens": users.StoredUsers(context.store.people).tokens()})
+
+
+@router.post(
+    "/tokens",
+    response_model=m.CreatedToken,
+    responses=problems(*_PROBLEMS, "user-not-found", "quota-exceeded"),
+    openapi_extra=body(NEW_TOKENS, "NewToken"),
+)
+async def create_token(context: Ctx, request: Request, work: Attended, received: Received) -> Response:
+    """Create a token of a user or of nobody, for administrators; the answer is the only one that has its secret.
+
+    A service that needs no login gets its first token on the page *Users and tokens*, or by `sprag admin token create`
+    with --db.
+    """
+    token = await work.read(users.read_token, received)
+    if not access_of(request).needed:
+        raise ApiError("not-allowed", Sentence(_FIRST))
+    answer = await _changed(request, users.created, context.store.people, token)
+    answer.headers["Cache-Control"] = "no-store"
+    return answer
+
+
+@router.post("/tokens/{token_id}:revoke", response_model=m.Token, responses=problems(*_PROBLEMS, "token-not-found"))
+async def revoke_token(
+    context: Ctx, request: Request, token_id: Annotated[str, Path(description="id of the token", max_length=40)]
+) -> Response:
+    """Revoke a token, for administrators; its browser sessions end within two seconds. Once more changes nothing."""
+    return await _changed(request, users.revoked, context.store.people, token_id)
 
 
 async def _changed(request: Request, change: Callable[..., object], *args: object) -> Response:

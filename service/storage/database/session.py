@@ -328,7 +328,7 @@ def _postgres() -> ModuleType:
         from sprag_study.service.storage.database import postgres
     except ImportError:
         raise DatabaseError(
-            "PostgreSQL needs a driver that is not installed: pip install 'sprag-study[postgres]'", "missing-extra"
+            'PostgreSQL needs a driver that is not installed: pip install "sprag-study[postgres]"', "missing-extra"
         ) from None
     return postgres
 

@@ -12,6 +12,8 @@ from sprag_study.worker.limits import MAX_NAME_LENGTH
 
 #: Most characters in the name of a user.
 MAX_USER_NAME: Final = 80
+#: Most days for which a token is valid, where it ends.
+MOST_DAYS: Final = 36_500
 
 
 def user_name(text: str, where: str = "name") -> str:

@@ -54,7 +54,7 @@ def asked(sprag: Run, office: Office) -> Run:
     "words",
     ["user list", "user add eve --role viewer --cases 10 --storage 3 --checks 0",
      "user change dora --role administrator --cases 5", "user change do --as-set cases", "user remove dora",
-     "user restore dora", "user hand-over dora --to vera"],
+     "user restore dora", "user hand-over dora --to vera", "token list"],
 )  # fmt: skip
 def test_users_are_the_same_by_the_service_and_in_its_database(
     asked: Run, sprag: Run, office: Office, words: str
@@ -62,7 +62,12 @@ def test_users_are_the_same_by_the_service_and_in_its_database(
     remote = asked("admin", *words.split(), "--json")
     assert remote.code == 0, remote.err
     (entry, *_) = office.store.audit.page(AuditFilter()).records
-    if words not in ("user list", "user restore dora", "user change do --as-set cases"):  # these change nothing
+    if words not in (
+        "user list",
+        "token list",
+        "user restore dora",
+        "user change do --as-set cases",
+    ):  # these change nothing
         assert (entry.door, entry.actor, entry.token) == ("api", "ada", office.ids["ada"])
     if words.startswith("user add"):
         with office.store.session.write() as connection:
@@ -74,6 +79,27 @@ def test_users_are_the_same_by_the_service_and_in_its_database(
     for answer in (told, kept):
         answer.pop("created_at", None)
     assert told == kept
+
+
+def test_tokens_are_created_and_revoked_by_the_service_as_in_its_database(
+    asked: Run, sprag: Run, office: Office
+) -> None:
+    created = []
+    for run in (asked, sprag):
+        new = run("admin", "token", "create", "--name", "night", "--user", "do", "--scope", "read", "--expires", 30)
+        assert (new.code, new.out[:6]) == (0, "sprag_"), new.err
+        created.append(office.store.people.tokens()[0])
+    (first, second) = ((it.name, it.owner, it.scope, it.expires_at.date() if it.expires_at else None) for it in created)
+    assert first == second
+    assert first[:3] == ("night", "dora", "read")
+    assert "It is shown only once." in asked("admin", "token", "create", "--name", "alone").err
+    for run, token in zip((asked, sprag), created, strict=True):
+        gone = run("admin", "token", "revoke", token.id, "--yes", "--json")
+        assert (gone.code, gone.data["state"], gone.data["id"]) == (0, "revoked", token.id), gone.err
+        unknown = run("admin", "token", "revoke", "tk_0", "--json")
+        assert (unknown.code, json.loads(unknown.err)["code"]) == (2, "token-not-found")
+        wrong = run("admin", "token", "create", "--name", " ", "--json")
+        assert (wrong.code, json.loads(wrong.err)["problems"][0]["parameter"]) == (2, "--name")
 
 
 def test_the_log_is_the_same_by_the_service_and_in_its_database(

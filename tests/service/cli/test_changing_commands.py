@@ -92,7 +92,7 @@ def commands_on_a_database() -> set[str]:
         for name, command in group.commands.items():
             if hasattr(command, "commands"):
                 yield from walk(command, f"{before}{name} ")
-            elif any("--db" in parameter.opts for parameter in command.params):
+            elif any("--db" in parameter.opts for parameter in (*command.params, *getattr(command, "shared", ()))):
                 yield before + name
 
     return set(walk(command_line("en"), ""))

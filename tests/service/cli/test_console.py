@@ -149,6 +149,11 @@ def test_sentences_of_a_calibration_are_beside_its_table(capsys: pytest.CaptureF
     shown = capsys.readouterr()
     assert shown.out.splitlines()[1] == "shaft.inertia [kg*m^2]\t0.002\t0.001\t0.003\t0.0005"
     assert shown.err == "Measure at 28 Hz.\n"
+    two = [one, {**one, "name": "damping", "unit": "1"}]
+    show_calibration({"parameters": two, "correlations": [[1.0, -0.5], [-0.5, 1.0]], "sentences": []})
+    head, first, second = (line.split("\t") for line in capsys.readouterr().out.splitlines())
+    assert head[-2:] == ["correlation shaft.inertia", "correlation damping"]
+    assert (first[-2:], second[-2:]) == (["1.0", "-0.5"], ["-0.5", "1.0"])
 
 
 def test_what_an_extension_adds_is_told() -> None:

@@ -34,7 +34,7 @@ from sprag_study.service.faults import Fault
 from sprag_study.service.languages.catalogue import Catalogue, Entry
 from sprag_study.service.languages.recorded import LATE
 from tests.service.conftest import PortalTransport, Service
-from tests.service.spec_sample import SPEC
+from tests.service.spec_sample import SPEC, changed
 
 Sprag = Callable[..., Any]
 
@@ -81,7 +81,7 @@ def unmarked(text: str, names: tuple[str, ...] = ()) -> list[str]:
     before = ""
     while before != text:
         before, text = text, MARKED.sub(" ", text)
-    text = CHOICES.sub(" ", re.sub("(?m)⟦[^⟦⟧\n]*$", " ", text))  # the first part of a text has no end
+    text = CHOICES.sub(" ", re.sub("(?m)⟦[^⟦⟧\n]*$(?:\n {16,}.*)?", " ", text))  # the first part of a text has no end
     for name in sorted(names, key=len, reverse=True):
         text = re.sub(rf"(?<![\w.-]){re.escape(name)}(?![\w-])", " ", text)
     return WORD.findall(NAMES.sub(" ", text))
@@ -427,3 +427,15 @@ def test_a_refusal_of_a_service_keeps_the_values_of_its_sentences(service: Servi
     assert [str(fault) for fault in RefusedError(422, again).faults] == [
         str(fault) for fault in RefusedError(422, answer.json()).faults
     ]
+
+
+def test_a_report_of_a_run_has_the_language_of_the_option_as_one_of_an_export(
+    sprag: Sprag, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spec, report = tmp_path / "spec.json", tmp_path / "report.html"
+    spec.write_text(json.dumps(changed({"/axes": [{"path": "shaft.load", "values": [0.1, 0.2]}]})), "utf-8")
+    monkeypatch.setenv("SPRAG_LANGUAGE", "uk")
+    for typed, language in (((), "en"), (("--language", "uk"), "uk")):
+        done = sprag(*typed, "run", spec, "-o", report)
+        assert (done.code, "виконано випадків" in done.err) == (0, True), done.err
+        assert f'<html lang="{language}"' in report.read_text("utf-8")

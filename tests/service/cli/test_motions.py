@@ -80,3 +80,14 @@ def test_a_run_starts_from_the_end_of_a_case_in_its_database(sprag: Sprag, tmp_p
     # It turns at once, so it has no run-up.
     (row,) = json.loads(done.out)["rows"]
     assert row["results"]["runup.time"] is None
+    for view in (
+        ("trajectory", "--points", 5),
+        ("settled", "--at-most", 200),
+        ("case",),
+        ("curves", "--x", "shaft.lode"),
+    ):
+        alone, here = (sprag("show", second, *view, *db) for db in ((), ("--db", database)))
+        assert (alone.code, "sprag run --db" in alone.err) == (2, True), view
+        assert (here.code in (0, 4), "shaft.lode" in here.err) == (view[0] != "curves", view[0] == "curves"), here.err
+    missing = sprag("show", second, "trajectory", "--db", tmp_path / "missing.sqlite3")
+    assert (missing.code, "there is no database" in missing.err) == (2, True)

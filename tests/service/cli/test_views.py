@@ -189,9 +189,20 @@ def test_wrong_settings_name_their_options(
         (("compare", *sources, "--x", "nonsense"), "--x"), (("compare", *sources, "--y", "nonsense"), "--y"),
         (("compare", *sources, "--x", "shaft.load", "--by", "nonsense"), "--by"),
         (("compare", two, two, "--x", "shaft.load", "--at", "excitation.frequency=9 Hz"), "--at"),
+        (("compare", two, two, "--at", "shaft.load=9 N*m"), "--at: the axis has no such value"),
+        (("compare", two, "one_pendulum", "--at", "shaft.lod=0.1"), "--at: not an axis of this study; did you mean"),
+        (("compare", two, two.with_name("missing.json")), "missing.json: no such file"),
+        (("show", "fastest_drive", "case", "--case", 1200), "(got 1200; allowed: 0 .. 1199)"),
+        (("show", "fastest_drive", "curves", "--x", "nonsense"), "--x"),
+        (("show", "fastest_drive", "curves", "--y", "nonsense"), "--y"),
+        (("show", "fastest_drive", "front", "--x", "nonsense"), "--x: is not a goal"),
+        (("show", "fastest_drive", "cases", "--sort", "nonsense"), "--sort"),
+        (("show", "fastest_drive", "calibration"), "the study is not a calibration"),
     ):  # fmt: skip
         done = sprag(*line)
         assert (done.code, named in done.err) == (2, True), (line, done.err)
+    with pytest.raises(AssertionError, match="the study is run before"):  # its cases decide which values there are
+        sprag("show", "refined_characteristic", "curves", "--at", "excitation.frequency=999")
     monkeypatch.setattr("sprag_study.service.views.case_view.see", run)
     done = sprag("show", sources[0], "strobes", "-o", "a.svg", "--language", "xx")
     assert (done.code, "--language: is not a language" in done.err) == (2, True), done.err
@@ -323,7 +334,11 @@ def test_every_view_has_a_command_with_its_settings() -> None:
     assert {about.name for about in CASE_VIEWS} == set(VIEWS_OF_CASES)
     for command, view in named.items():
         if view in abouts:
-            options = {name for parameter in commands[command].params for name in (*parameter.opts, parameter.name)}
+            options = {
+                name
+                for parameter in (*commands[command].params, *commands[command].shared)
+                for name in (*parameter.opts, parameter.name)
+            }
             asked = {
                 one.name if one.setting.positional else one.option for one in settings_of(abouts.pop(view).question)
             }

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 import typer
@@ -21,7 +21,7 @@ from sprag_study.service.cli.app import command_line
 from sprag_study.service.cli.groups import common_first
 from sprag_study.service.cli.old_words import OLD, forwarded, without_gone
 from sprag_study.service.client import Client
-from sprag_study.service.login import DEFAULT_SERVER
+from sprag_study.service.login import DEFAULT_SERVER, access_of
 from sprag_study.service.login import profile_file as login_file
 from sprag_study.service.storage.people.scopes import TokenScope
 from tests.conftest import Finished
@@ -38,17 +38,54 @@ def leaves(command: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str
         yield from leaves(inner, (*path, name))
 
 
+#: Options that no help lists: what installs completion, what 1.0.0 has, and what a kernel of the doctor is for.
+HIDDEN = {"--install-completion", "--show-completion", "--format", "--pendulums", "--coefficients", "--tolerance"}
+
+
 def test_there_are_twenty_words_and_few_options(sprag: Sprag) -> None:
     assert len(command_line().commands) <= 20
     assert len(sprag("--help").out.splitlines()) <= 45
     assert len(sprag("--language", "uk", "--help").out.splitlines()) <= 45
-    visible = [
+    options = [
         option
         for _, command in leaves(command_line())
         for option in command.params
-        if option.param_type_name == "option" and not option.hidden
+        if option.param_type_name == "option"
     ]
-    assert len(visible) <= 250
+    assert {option.opts[0] for option in options if option.hidden} == HIDDEN
+    assert len([option for option in options if not option.hidden]) <= 250
+
+
+def test_an_option_of_a_group_is_read_once_for_all_its_commands() -> None:
+    for path, group in leaves(command_line()):
+        for command in getattr(group, "commands", {}).values():
+            shared, params = getattr(command, "shared", ()), command.params
+            assert not {id(option) for option in shared} & {id(option) for option in params}, path
+            assert {id(option) for option in shared} <= {
+                id(it) for _, above in leaves(command_line()) for it in above.params
+            }
+    views = command_line().commands["show"].commands
+    assert "--units" not in [text for option in views["curves"].params for text in option.opts]
+    assert views["curves"].shared[1] is views["map"].shared[1]
+
+
+@pytest.mark.parametrize(
+    "words", [("--units", "rpm", "ID", "curves"), ("ID", "curves", "--units", "rpm"), ("--units=rpm", "curves", "ID")]
+)
+def test_an_option_of_a_group_stands_before_or_behind_its_command(words: tuple[str, ...]) -> None:
+    show = cast("Any", command_line().commands["show"])
+    context = show.make_context("show", list(words), parent=None, resilient_parsing=True)
+    name, command, rest = show.resolve_command(context, [*context._protected_args, *context.args])
+    inner = command.make_context(name, rest, parent=context)
+    assert (name, inner.params["study"], inner.params["units"]) == ("curves", "ID", "rpm")
+
+
+def test_the_value_of_an_option_is_no_command(sprag: Sprag, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = sprag("admin", "--db", "user", "user", "list")
+    assert (done.code, f"{tmp_path / 'user'}: there is no database" in done.err) == (2, True), done.err
+    refused = sprag("show", "--units", "rpm", "one_pendulum", "state")
+    assert (refused.code, "No such option: --units" in refused.err) == (2, True), refused.err
 
 
 def test_help_says_which_views_have_a_shared_option() -> None:
@@ -56,12 +93,14 @@ def test_help_says_which_views_have_a_shared_option() -> None:
     titles = {name: title for title, name, _ in show.listed()}
     views: dict[str, set[str]] = {}
     for name, view in show.commands.items():
-        for option in view.params:
+        for option in (*view.params, *view.shared):
             views.setdefault(option.name, set()).add("case" if name == "case" else titles[name])
-    assert views["units"] == views["db"] == {"Of a study", "case"}
+    assert views["units"] == {"Of a study", "case"}
+    assert views["db"] == {"Of a study", "Of one case (--case N)", "case"}
+    assert views["by"] == views["at"] == {"Of a study"}
     assert views["case"] == {"Of one case (--case N)", "case"}
     assert views["start"] == {"Of one case (--case N)"}
-    said = "--units and --db are of a study and of `case`, --case and --start of one case."
+    said = "--by and --at are of views with axes, --case and --start of one case."
     assert said in " ".join(show.help.split())
 
 
@@ -291,6 +330,8 @@ def test_the_secret_of_this_machine_is_not_sent_to_the_service_of_a_login(
     for kept, sent in (({}, ""), ({"token": "kept"}, "kept")):
         login.write_text(json.dumps({"server": "http://far.example", **kept}))
         assert common.access()[:2] == ("http://far.example", sent)
+        given = access_of("http://far.example/", None).token
+        assert given == (sent or "a-secret-of-this-machine"), "as to every address that is given"
     monkeypatch.setenv("SPRAG_SERVER", "http://near.example")
     assert common.access()[:2] == ("http://near.example", "a-secret-of-this-machine")
     with Client("http://far.example", "") as client:

@@ -103,6 +103,15 @@ OPERATIONS: dict[str, tuple[Call, str]] = {
         lambda c, _: c.hand_over_user("dora", "emil"),
         "admin user hand-over dora --to emil --server http://sprag",
     ),
+    "list_tokens": (lambda c, _: c.tokens(), "admin token list --server http://sprag"),
+    "create_token": (
+        lambda c, _: c.create_token("laptop", user="dora", days=30),
+        "admin token create --name laptop --user dora --expires 30 --server http://sprag",
+    ),
+    "revoke_token": (
+        lambda c, _: c.revoke_token("tk_1"),
+        "admin token revoke tk_1 --yes --server http://sprag",
+    ),
     "get_audit": (lambda c, _: c.audit(), "admin audit --server http://sprag"),
     "livez": (lambda c, _: c.live(), "admin health"),
     "readyz": (lambda c, _: c.ready(), "admin health"),

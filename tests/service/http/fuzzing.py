@@ -81,6 +81,8 @@ FURTHER_RULES: Final = (
     "add_user",
     "change_user",
     "hand_over_user",
+    "create_token",
+    "revoke_token",
 )
 
 

@@ -37,5 +37,5 @@ def test_the_setting_is_checked() -> None:
 
 def test_without_dask_the_command_that_brings_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "sprag_study.worker.executors.dask", None)
-    with pytest.raises(ExecutorError, match=r"pip install 'sprag-study\[cluster\]'"):
+    with pytest.raises(ExecutorError, match=r'pip install "sprag-study\[cluster\]"'):
         pool(WorkerSettings("", 1, 60.0, executor="dask"))

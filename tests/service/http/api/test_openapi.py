@@ -22,6 +22,7 @@ from sprag_study.service.http.app import create_app
 from sprag_study.service.http.guard import OPEN_PATHS
 from sprag_study.service.http.problems import PROBLEM_TYPES
 from sprag_study.service.storage.errors import UserExistsError
+from sprag_study.service.storage.people.scopes import TokenScope
 from tests.service.calibrating import calibration
 from tests.service.searching import search
 from tests.service.swept_study import swept_study
@@ -147,11 +148,13 @@ def sent_to(
     if "{component_id}" in path:
         made = service.http.post("/api/v1/components", json=COMPONENTS).json()["components"]
         address = address.replace("{component_id}", made[0]["id"])
-    if "/users" in path:
+    if "/users" in path or "/tokens" in path:
         for name in ("dora@example.com", "emil@example.com"):
             with suppress(UserExistsError):
                 service.store.people.add_user(name, Role.DESIGNER)
         address = address.replace("{user}", "dora@example.com")
+    if "{token_id}" in path:
+        address = address.replace("{token_id}", service.store.people.create_token("old", TokenScope.READ)[1].id)
     if "{view_id}" in path:
         curves = {"page": "curves", "name": "loads", "study": study_id, "in_report": True}
         saved = service.http.post("/api/v1/views", json=curves).json()["id"]

@@ -1,4 +1,4 @@
-"""Users by the interface for programs: administrators list, add, change, remove and restore them."""
+"""Users and tokens by the interface for programs: administrators list, add, change, remove and restore them."""
 
 from __future__ import annotations
 
@@ -18,12 +18,14 @@ if TYPE_CHECKING:
     from sprag_study.service.settings import Settings
     from tests.service.conftest import Service
 
-USERS = "/api/v1/users"
+USERS, TOKENS = "/api/v1/users", "/api/v1/tokens"
 #: By route: the address, the body, and what the log has.
 CHANGES: dict[str, tuple[str, dict[str, Any], str]] = {
     "POST /api/v1/users": (USERS, {"name": "eve@example.com", "role": "designer", "most_cases": 7}, "user.add"),
     "PATCH /api/v1/users/{user}": (f"{USERS}/dora", {"role": "viewer", "most_bytes": 0}, "user.change"),
     "POST /api/v1/users:hand-over": (f"{USERS}:hand-over", {"name": "dora", "to": "vera"}, "user.hand-over"),
+    "POST /api/v1/tokens": (TOKENS, {"name": "night", "user": "dora", "days": 30}, "token.create"),
+    "POST /api/v1/tokens/{token_id}:revoke": (f"{TOKENS}/DORA:revoke", {}, "token.revoke"),
 }
 
 
@@ -35,12 +37,16 @@ def office(settings: Settings, service: Service, connect: Callable[..., httpx.Cl
 @pytest.mark.parametrize("route", CHANGES)
 def test_every_change_of_a_user_is_in_the_log(office: Office, route: str) -> None:
     address, body, action = CHANGES[route]
+    address = address.replace("DORA", office.ids["dora"])
     answer = office.program("ada").request(route.partition(" ")[0], address, json=body)
     assert answer.status_code == 200, answer.text
     (entry, *_) = office.store.audit.page(AuditFilter()).records
     assert (entry.action, entry.door, entry.actor, entry.token) == (action, "api", "ada", office.ids["ada"])
     assert entry.request == answer.headers["x-request-id"]
-    assert entry.target == body.get("name", "dora")
+    if action == "token.create":
+        assert (entry.target, entry.detail["owner"]) == (answer.json()["id"], "dora")
+    else:
+        assert entry.target == (office.ids["dora"] if action == "token.revoke" else body.get("name", "dora"))
 
 
 def test_users_are_added_changed_removed_and_restored(office: Office) -> None:
@@ -86,17 +92,24 @@ def test_what_belongs_to_a_user_is_handed_over(office: Office) -> None:
         ("POST", f"{USERS}:hand-over", {"name": "dora", "to": "nobody"}, "user-not-found", []),
         ("POST", f"{USERS}:hand-over", {"name": "dora", "to": "dora"}, "invalid-parameter", [None]),
         ("POST", f"{USERS}:hand-over", {"name": "dora"}, "invalid-body", ["/to"]),
+        ("POST", TOKENS, {}, "invalid-body", ["/name"]),
+        ("POST", TOKENS, {"name": "a\nb", "scope": "all", "days": 0, "for": 1}, "invalid-body",
+         ["/for", "/name", "/scope", "/days"]),
+        ("POST", TOKENS, {"name": 1, "user": " x", "days": 36_501}, "invalid-body", ["/name", "/user", "/days"]),
+        ("POST", TOKENS, {"name": "night", "user": "nobody"}, "user-not-found", []),
+        ("POST", f"{TOKENS}/tk_0:revoke", {}, "token-not-found", []),
     ],
 )  # fmt: skip
 def test_what_is_wrong_changes_nothing(
     office: Office, method: str, path: str, body: dict[str, Any], problem: str, where: list[str | None]
 ) -> None:
-    before = office.store.people.users(), office.store.audit.page(AuditFilter())
+    before = office.store.people.users(), office.store.people.tokens(), office.store.audit.page(AuditFilter())
     answer = office.program("ada").request(method, path, json=body)
     told = answer.json()
     assert told["type"] == f"/problems/{problem}", told
     assert [fault.get("pointer") for fault in told.get("errors", [])] == where
-    assert (office.store.people.users(), office.store.audit.page(AuditFilter())) == before
+    people = office.store.people
+    assert (people.users(), people.tokens(), office.store.audit.page(AuditFilter())) == before
 
 
 def test_who_is_no_longer_an_administrator_changes_no_users(office: Office, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -117,3 +130,32 @@ def test_the_first_user_is_not_added_without_a_token(service: Service) -> None:
     assert (refused.status_code, refused.json()["type"]) == (403, "/problems/not-allowed")
     assert "Users and tokens" in refused.json()["detail"]
     assert service.store.people.users() == ()
+
+
+def test_tokens_are_created_and_revoked_by_administrators(office: Office) -> None:
+    ada = office.program("ada")
+    answer = ada.post(TOKENS, json={"name": "night", "user": "dora", "scope": "read", "days": 2})
+    made = answer.json()
+    secret = made.pop("token")
+    assert answer.headers["cache-control"] == "no-store"
+    assert (made["name"], made["user"], made["scope"], made["state"]) == ("night", "dora", "read", "valid")
+    assert ada.get(TOKENS).json()["tokens"][0] == made
+    assert secret not in ada.get(TOKENS).text
+    office.tokens["night"] = secret
+    program = office.program("night")
+    assert program.get("/api/v1/me").json()["token"] == "night", "known without a delay"
+    for name in ("dora", "night"):
+        for refused in (office.program(name).post(TOKENS, json={"name": "more"}), office.program(name).get(TOKENS)):
+            assert refused.status_code == 403, refused.text
+    for _ in range(2):
+        assert ada.post(f"{TOKENS}/{made['id']}:revoke").json()["state"] == "revoked"
+    assert program.get("/api/v1/me").status_code == 401
+    alone = ada.post(TOKENS, json={"name": "alone"}).json()
+    assert (alone["user"], alone["scope"], alone["expires_at"]) == (None, "write", None)
+    assert ada.post(TOKENS, json={"name": "always", "user": None, "days": None}).status_code == 200
+
+
+def test_a_service_that_is_open_creates_no_token(service: Service) -> None:
+    refused = service.http.post(TOKENS, json={"name": "first"})
+    assert (refused.status_code, refused.json()["type"]) == (403, "/problems/not-allowed")
+    assert service.store.people.tokens() == ()
