@@ -88,7 +88,6 @@ KIND_MEANINGS: Final[dict[Kind, str]] = {
     "not-a-database": "The file or database is not one of Sprag.",
     "not-done": "The study was not finished.",
     "target-not-empty": "The target of a move has rows already, or an unfinished move of another database.",
-    "token-not-found": "There is no such token.",
     "unknown-tables": "The database has tables of another program, which are not moved.",
     "unreachable": "No service answered at this address.",
     "unsupported-database": "This kind, version or place of a database is not supported.",

@@ -84,7 +84,7 @@ class Limit(StrEnum):
 
 
 #: Options whose parameter of the same name can be at fault.
-_OPTIONS: Final = frozenset({*Limit, "to", "--name"})
+_OPTIONS: Final = frozenset({*Limit, "to"})
 
 AsSet = Annotated[
     list[Limit] | None,
