@@ -135,6 +135,8 @@ class Recorder:
             return httpx.Response(200, json={**STUDY, "id": BUSY, "state": "finished" if listened else "running"})
         if self.asked[-1] == ("get", "/livez"):
             return httpx.Response(200, json={"status": "ok"})
+        if self.asked[-1] == ("get", "/api/v1/tokens"):
+            return httpx.Response(200, json={"tokens": []})
         if self.asked[-1] == ("get", "/api/v1/users"):
             return httpx.Response(200, json={"users": [{**USER, "name": name} for name in ("dora", "emil")]})
         return httpx.Response(418, json={"title": "refused"})
