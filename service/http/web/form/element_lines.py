@@ -36,17 +36,17 @@ def _element(number: int, line: str, faults: list[str]) -> dict[str, Any]:
     return element
 
 
-def lines_of(elements: Sequence[Mapping[str, Any]]) -> str:
-    """The lines of elements."""
-    return "\n".join(
-        "; ".join(
-            (
-                f"{each['kind']} {each['name']}",
-                *(f"{name} = {text_of(value)}" for name, value in each.items() if name not in {"kind", "name"}),
-            )
-        )
-        for each in elements
-    )
+def lines_of(elements: Sequence[Any]) -> str:
+    """The lines of elements; raises ValueError for one that is not an object."""
+    if not all(isinstance(element, Mapping) for element in elements):
+        raise ValueError("the form has no line for an element that is not an object")
+    return "\n".join(map(_line, elements))
+
+
+def _line(element: Mapping[str, Any]) -> str:
+    head = " ".join(str(element[name]) for name in ("kind", "name") if name in element)
+    fields = (f"{name} = {text_of(value)}" for name, value in element.items() if name not in {"kind", "name"})
+    return "; ".join((head, *fields))
 
 
 def element_of(pointer: str) -> str:

@@ -43,6 +43,7 @@ TEXTS = {
     "list": "0; 200; = 2 N*m/rad; 20000", "measured": "angle_rad\ttorque_Nm\n0.0\t0.0\n0.01\t2.0",
     "steps": "0 deg; 10 deg; 1 kN\n20 deg; 30 deg; 2", "constants": "k = 40\nm = 2", "text": "2 + sin(phi)",
     "table": "angle [deg],force [kN]\n0,0\n180,20", "tick": "on",
+    "elements": "pivot B; x = 220 mm\nRRR C; from = A; to = B; first = 200 mm; second = 0.13",
 }  # fmt: skip
 COUNTS = {"pendulums": (1, 3), "stages": (0, 2), "parts": (0, 2)}
 
