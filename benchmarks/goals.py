@@ -385,7 +385,7 @@ def main() -> None:
     """Print everything; exit status 1 below a bar."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", choices=["problems", "drive", "one", "hard"])
-    parser.add_argument("--seeds", type=int, metavar="COUNT", help="instead of 11, 5 and 11")
+    parser.add_argument("--seeds", type=int, metavar="COUNT", help="instead of 11; of the drive instead of 5")
     chosen = parser.parse_args()
     met = True
     if chosen.only in {None, "problems"}:

@@ -95,14 +95,22 @@ def extended_study(library: Library, study_id: str, body: Body, warnings: Sequen
     """
     study = library.store.studies.study(study_id)
     addition = body.data()
-    rounds = library.store.studies.rounds(study_id) if study.plan is not None else []
-    came_to = rounds[-1].summary.get("generation") if rounds else None
-    parsed = parse_extended(accepted(library.store.studies.spec(study_id), study), study, addition, came_to)
+    spec = accepted(library.store.studies.spec(study_id), study)
+    parsed = parse_extended(spec, study, addition, _came_to(library.store, study_id) if study.plan else None)
     named = isinstance(addition, Mapping) and "name" in addition
     nothing_new = study.plan is None and parsed.study.cases == study.cases and not named
     return replace(
         parsed, warnings=(*warnings, *parsed.warnings), same_as=study_id if nothing_new else "", follows=not named
     )
+
+
+def _came_to(store: Store, study_id: str) -> int | None:
+    """How many generations a search has come to that is over; None of one that still runs."""
+    rounds = store.studies.rounds(study_id)
+    if not rounds or not (rounds[-1].summary.get("phase") == "ended" or store.studies.get(study_id).over):
+        return None
+    generation: int | None = rounds[-1].summary.get("generation")
+    return generation
 
 
 def _refuse_without_time(study: Study) -> None:

@@ -49,6 +49,15 @@ def test_a_search_that_ended_by_itself_goes_on_from_there(service: Service) -> N
     assert (goal["generations"], goal["least_gain"]) == (reached + 40, 0)
 
 
+def test_a_search_that_still_runs_goes_on_beyond_its_last_generation(service: Service) -> None:
+    study_id = search(service, 2, **ONE, generations=60)
+    assert not service.store.studies.get(study_id).over
+    longer = service.http.post(f"{API}/studies/{study_id}:extend", json={"generations": 3}).json()["id"]
+    goal = service.get(f"/studies/{longer}")["spec"]["goal"]
+    assert goal["generations"] == 63
+    assert "least_gain" not in goal
+
+
 def test_the_page_has_the_action(service: Service) -> None:
     study_id = search(service, **ONE, generations=2)
     assert 'name="generations"' in service.http.get(f"/studies/{study_id}").text
