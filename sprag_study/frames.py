@@ -111,7 +111,7 @@ def _of_model(
 
     axes = [{"path": path, "values": np.broadcast_to(values, count).tolist()} for path, values in columns.items()]
     study = parse_spec({"sprag": 1, "model": model, "base": base, "axes": axes, "combine": "zip"}).study
-    rows, infos = models.run_chunk(study, 0, study.cases), models.study_results(study)
+    rows, infos = models.run_chunk(study, 0, study.cases), models.model_results(study)
     table: dict[str, Any] = {"ending": list(rows.endings)}
     return _framed(table | {info.name: rows.values[:, k] for k, info in enumerate(infos)}, infos, index)
 

@@ -51,7 +51,8 @@ _NARROWINGS = 50
 _MOST = 16
 #: Part of a group's size within which its links count as lying in one line.
 _TOUCHING = 1e-9
-_START, _END, _COUNT, _SURPLUS = "stroke.start", "stroke.end", "stroke.count", "stroke.surplus"
+_START, _END, _SWING = "stroke.start", "stroke.end", "stroke.swing"
+_COUNT, _SURPLUS = "stroke.count", "stroke.surplus"
 
 
 class Pose(NamedTuple):
@@ -167,13 +168,20 @@ class PlanarLinkage(RodMechanism):
 
     def _travelled(self, values: Values, pose: Pose) -> Floats:
         """Way of the working part from the start of its forward stroke."""
-        start = self.pose(values, self.dead_centres(values)[0])
-        (home, _, _), (place, _, lever) = self.travel(start), self.travel(pose)
-        if self.working_link in {None, FRAME}:
+        stroke = values if _START in values or self.working_link is None else self.prepared(values)
+        place, _, lever = self.travel(pose)
+        if self.working_link is None:
+            return place.x
+        home = self.travel(self.pose(values, stroke[_START]))[0]
+        if self.working_link == FRAME:
             return np.asarray(place.x - home.x)
-        turned = self._sign * elementary.arctan2(home.cross(place), home.scalar(place))
-        # An arc of up to three quarters of a turn.
-        return np.asarray(lever * (np.mod(turned + 0.5 * np.pi, _TURN) - 0.5 * np.pi))
+        # From half a turn before the middle of the arc to half a turn behind it.
+        least = 0.5 * stroke[_SWING] - np.pi
+        return np.asarray(lever * (np.mod(self._turned(home, place) - least, _TURN) + least))
+
+    def _turned(self, home: Vector, place: Vector) -> Floats:
+        """Angle from one direction of the working part to another along its forward stroke, up to whole turns."""
+        return np.asarray(self._sign * elementary.arctan2(home.cross(place), home.scalar(place)))
 
     def motion(self, values: Values, phi: Floats) -> Motion:
         """See Mechanism."""
@@ -195,11 +203,11 @@ class PlanarLinkage(RodMechanism):
         return total
 
     def prepared(self, values: Values) -> dict[str, Floats]:
-        """Ends of the forward stroke, how often the working part reverses in a turn, and where it does so too often."""
+        """Ends of the forward stroke, the angle of its arc, the reversals in a turn, and where there are too many."""
         if self.working_link is None:
             return {}
         if _START in values:
-            return {name: values[name] for name in (_START, _END, _COUNT, _SURPLUS)}
+            return {name: values[name] for name in (_START, _END, _SWING, _COUNT, _SURPLUS)}
         cases = max(len(value) for value in values.values())
         grid: Floats = np.asarray(_TURN / _ANGLES * np.arange(_ANGLES + 1), dtype=np.float64)
         grid_slope = self.travel(self.pose(values, grid[None, None, :]))[1]
@@ -225,8 +233,17 @@ class PlanarLinkage(RodMechanism):
         order = np.arange(len(case)) - np.searchsorted(case, case)
         surplus[case[order == 2]] = angle[order == 2]
         surplus[known & (count < 2.0)] = 0.0
-        kept = {_START: start, _END: end, _COUNT: count, _SURPLUS: surplus}
-        return {name: value.reshape(-1, 1, 1) for name, value in kept.items()}
+        stroke = {_START: start, _END: end, _COUNT: count, _SURPLUS: surplus}
+        shaped = {name: value.reshape(-1, 1, 1) for name, value in stroke.items()}
+        return shaped | {_SWING: self._swing(values, shaped[_START], shaped[_END])}
+
+    def _swing(self, values: Values, start: Floats, end: Floats) -> Floats:
+        """Angle of the arc between two angles of the crank, less than a turn; 0 for a working part on a guide."""
+        if self.working_link == FRAME:
+            return np.zeros_like(start)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            home, place = (self.travel(self.pose(values, angle))[0] for angle in (start, end))
+            return np.asarray(np.mod(self._turned(home, place), _TURN))
 
     def dead_centres(self, values: Values) -> tuple[Floats, Floats]:
         """See Mechanism; half a turn apart where nothing works."""
@@ -306,7 +323,7 @@ class PlanarLinkage(RodMechanism):
             return None
         count, name = int(self.prepared(values)[_COUNT].flat[0]), self.choice.working
         if count < 2:
-            return Sentence("the working part {name} turns fully and never comes back: it has no stroke", name=name)
+            return Sentence("the working part {name} turns fully or stands still, and has no stroke", name=name)
         if count > 2:
             return Sentence(
                 "the working part {name} reverses {count} times in a turn, and a stroke goes to and fro once",

@@ -27,7 +27,7 @@ def regimes(
     """The regimes to which one case comes from its many starts, with their shares."""
     import numpy as np
 
-    from sprag_study.worker.models import run_chunk, study_results
+    from sprag_study.worker.models import model_results, run_chunk
     from sprag_study.worker.models.starts import has_starts
     from sprag_study.worker.reuse import taken
 
@@ -43,7 +43,7 @@ def regimes(
             detail=_("the study has no starts"),
         )
     done = run_chunk(taken(study, np.array([case])) if study.axes else study, 0, 1)
-    infos = {info.name: (place, info) for place, info in enumerate(study_results(study))}
+    infos = {info.name: (place, info) for place, info in enumerate(model_results(study))}
     further = () if done.further is None else done.further.values
     rows = [
         {name: infos[name][1].cell(float(row[infos[name][0]])) for name in _SHOWN} for row in (done.values[0], *further)

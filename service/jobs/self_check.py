@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from sprag_study.worker.models import MACHINE_SHAFT, OK, run_chunk, study_results
+from sprag_study.worker.models import MACHINE_SHAFT, OK, model_results, run_chunk
 from sprag_study.worker.study import Study
 
 #: Largest acceptable relative difference.
@@ -37,7 +37,7 @@ def check_known_values() -> tuple[list[str], float]:
         if result.endings != [OK]:
             wrong.append(f"{study.name} ended as {result.endings[0]}")
             continue
-        values = dict(zip((info.name for info in study_results(study)), result.values[0].tolist(), strict=True))
+        values = dict(zip((info.name for info in model_results(study)), result.values[0].tolist(), strict=True))
         for name, value in expected.items():
             difference = abs(values[name] - value) / abs(value)
             largest = max(largest, difference)

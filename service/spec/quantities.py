@@ -96,7 +96,7 @@ def read_quantities(draft: Draft) -> tuple[Quantity, ...]:
 
 def _formula(item: Node, name: str, draft: Draft, infos: Sequence[ResultInfo]) -> tuple[Node, Node] | None:
     """The formula and the unit of an entry; None, and a fault recorded, where one is no text or the name is taken."""
-    if not re.match(NAME, name):
+    if not re.fullmatch(NAME, name):
         item.refuse(
             "invalid-text", "is not a name of a quantity", name,
             allowed=Sentence(
@@ -177,7 +177,15 @@ def _quantity(
             formula.refuse("invalid-path", message, allowed=known)
         return None
     except FormulaError as error:
-        wrong = unit if unit.given and error.code not in {"invalid-formula", "too-long"} else formula
-        wrong.refuse(error.code, error.message)
+        (formula if _is_wrong(formula.value, units) else unit).refuse(error.code, error.message)
         return None
     return Quantity(name, read.text, si, formula.value.strip())
+
+
+def _is_wrong(formula: str, units: dict[str, str]) -> bool:
+    """Whether a formula is wrong whatever the unit of its value."""
+    try:
+        read_quantity(formula, units)
+    except FormulaError:
+        return True
+    return False

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 PARTS: Final = {
     "cycle": N_("revolutions of a cycle"),
     "mechanism": N_("the mechanism"),
+    "working": N_("joint of the working part"),
     "operation": N_("how the resistance is given"),
 }
 
@@ -74,10 +75,17 @@ def _mechanism_choices(mechanism: Mapping[str, Any]) -> Iterator[tuple[str, str]
             yield f"mechanism.{mechanism['kind']}.{name}", mechanism[name]
     if mechanism.get("linkage"):
         linkage = mechanism["linkage"]
-        yield "mechanism.linkage.elements", ", ".join(f"{each['kind']} {each['name']}" for each in linkage["elements"])
+        yield "mechanism.linkage.elements", "; ".join(map(_element_text, linkage["elements"]))
+        yield "mechanism.linkage.working", linkage["working"] or "none"
         yield "mechanism.linkage.forward", "negative" if linkage["reversed"] else "positive"
     if mechanism.get("table"):
         yield "mechanism.interpolation", mechanism["table"]["interpolation"]
+
+
+def _element_text(element: Mapping[str, Any]) -> str:
+    """``RRR C (A, B, left)``: what an element is attached to, and its branch."""
+    attached = ", ".join(filter(None, [*element["joints"], *element["guides"], element["branch"]]))
+    return f"{element['kind']} {element['name']}{f' ({attached})' if attached else ''}"
 
 
 def _operation_choices(operation: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

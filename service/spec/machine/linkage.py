@@ -82,11 +82,11 @@ def read_linkage(node: Node) -> dict[str, Any] | None:
     known = [element for element in elements if element is not None]
     if not node.sound or len(known) < len(elements):
         return None
-    made = {"elements": known, "working": working.value or "", "reversed": forward == "negative"}
-    for fault in machine_shaft.element_faults(LinkageChoice.from_json(made)):
+    linkage = {"elements": known, "working": working.value or "", "reversed": forward == "negative"}
+    for fault in machine_shaft.element_faults(LinkageChoice.from_json(linkage)):
         place = node[fault.field] if fault.element is None else node["elements"][fault.element][fault.field]
         place.refuse("conflict", fault.message, fault.value, allowed=fault.allowed)
-    return made if node.sound else None
+    return linkage if node.sound else None
 
 
 def _read_element(node: Node) -> dict[str, Any] | None:
@@ -117,7 +117,7 @@ def _read_element(node: Node) -> dict[str, Any] | None:
 
 
 def _read_name(node: Node, default: str | None) -> str | None:
-    """The name of a joint or a link; whether there is such a one is asked of the whole linkage."""
+    """The name of a joint or a link; whether the linkage has it is asked of the whole."""
     if not node.given and default is not None:
         return default
     if isinstance(node.value, str) and node.value:

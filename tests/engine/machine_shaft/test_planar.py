@@ -158,6 +158,34 @@ SIX_BAR = (
 )
 
 
+def test_an_arc_of_more_than_three_quarters_of_a_turn() -> None:
+    """Two slotted bars, each about a pivot just inside the arc of the one before it, swing 297 deg."""
+    crank, coupler, rocker = math.sin(math.pi / 3.0), 3.0, 1.0
+    frame = math.sqrt(coupler**2 + rocker**2 - crank**2)
+    # The rocker swings 60 deg to either side of its middle, where the coupler is in line with the crank.
+    ends = [(frame**2 + rocker**2 - reach**2) / (2.0 * frame * rocker) for reach in (coupler + crank, coupler - crank)]
+    middle = math.pi - 0.5 * sum(map(math.acos, ends))
+    x, y = 0.97 * math.cos(middle), 0.97 * math.sin(middle)
+    choice, numbers = linkage(
+        pivot("B", frame), rrr("C", "A", "B", first=coupler, second=rocker),
+        pivot("P", frame + x, y), rpr("L", "C", "P"), point("E", "L.second", 1.0),
+        pivot("Q", frame + 2.0 * x, 2.0 * y), rpr("M", "E", "Q"), point("F", "M.second", 2.0),
+        crank=crank, working="F",
+    )  # fmt: skip
+    engine, v = PlanarLinkage(choice), arrays(numbers)
+    assert np.isnan(engine.unassembled(v)[0])
+    stroke = Stroke.of(engine, v)
+    # From the law of cosines: a circle of radius 1 seen from a point at 0.97 of its radius.
+    bar = math.atan2(math.sin(math.pi / 3.0), math.cos(math.pi / 3.0) - 0.97)
+    bar = math.atan2(math.sin(bar), math.cos(bar) - 0.97)
+    assert 2.0 * bar > 1.6 * math.pi
+    assert float(stroke.length.flat[0]) == pytest.approx(2.0 * 2.0 * bar, rel=1e-9)
+    phi = stroke.start + np.linspace(0.0, 2.0 * math.pi, 2001)[None, None, :]
+    way, forward = engine.way(v, phi)[0, 0], (phi < stroke.end)[0, 0]
+    assert np.diff(way[forward]).min() > -1e-9
+    assert np.diff(way[~forward]).max() < 1e-9
+
+
 def test_a_case_has_the_same_bits_in_every_block() -> None:
     choice, numbers = linkage(*SIX_BAR, crank=0.06, working="R")
     spec = MachineSpec(
@@ -193,7 +221,7 @@ def test_a_case_has_the_same_bits_in_every_block() -> None:
         ((pivot("B", 0.05), rpr("L", "A", "B", offset=0.06)), "",
          "A comes nearer to B than the line of the bar of the group L passes it, so that the bar has no direction"),
         ((pivot("B", 0.05), rrr("C", "A", "B", first=0.12, second=0.12)), "C",
-         "refused at a shaft angle of 0 deg: the working part C turns fully and never comes back: it has no stroke"),
+         "refused at a shaft angle of 0 deg: the working part C turns fully or stands still, and has no stroke"),
         ((pivot("B", 0.4), rrr("C", "A", "B", first=0.35, second=0.22), point("D", "C.first", 0.17, -0.34),
           rrp("R", "D", first=1.5, angle=1.5)), "R", "the working part R reverses 4 times in a turn"),
     ],

@@ -63,6 +63,11 @@ def test_the_unit_follows_from_the_formula(formula: str, unit: str | None, expec
     ("quantities", "place", "code"),
     [
         ({"asked": "torque.max + shaft.speed.mean"}, "/quantities/asked", "wrong-unit"),
+        (
+            {"asked": {"formula": "torque.max + shaft.speed.mean", "unit": "N*m"}},
+            "/quantities/asked/formula",
+            "wrong-unit",
+        ),
         ({"asked": {"formula": "torque.max", "unit": "kg"}}, "/quantities/asked/unit", "wrong-unit"),
         ({"asked": {"formula": "torque.max", "unit": "Nmm2x"}}, "/quantities/asked/unit", "wrong-unit"),
         ({"asked": {"formula": "torque.max", "unit": 3}}, "/quantities/asked/unit", "wrong-type"),
@@ -81,6 +86,7 @@ def test_the_unit_follows_from_the_formula(formula: str, unit: str | None, expec
         ({"max": "1"}, "/quantities/max", "conflict"),
         ({"kg": "1"}, "/quantities/kg", "conflict"),
         ({"Cost": "1"}, "/quantities/Cost", "invalid-text"),
+        ({"cost\n": "1"}, "/quantities/cost\n", "invalid-text"),
         ({"a.b": "1"}, "/quantities/a.b", "invalid-text"),
         ({"first": "other", "other": "1 + first"}, "/quantities/first", "circular"),
         ({f"q{number}": "1" for number in range(51)}, "/quantities", "too-many"),

@@ -66,7 +66,7 @@ def along(studies: Sequence[tuple[str, Study]], result: str) -> dict[str, tuple[
     found = {}
     for name, study in studies:
         rows = models.run_chunk(study, 0, study.cases)
-        place = [info.name for info in models.study_results(study)].index(result)
+        place = [info.name for info in models.model_results(study)].index(result)
         y = np.where([ending == models.OK for ending in rows.endings], rows.values[:, place], np.nan)
         known = y[np.isfinite(y)]
         if known.size:
@@ -80,7 +80,7 @@ def values_of_result(studies: Sequence[tuple[str, Study]], result: str) -> dict[
     values = {}
     for name, study in studies:
         rows = models.run_chunk(study, 0, 1)
-        place = [info.name for info in models.study_results(study)].index(result)
+        place = [info.name for info in models.model_results(study)].index(result)
         if rows.endings[0] == models.OK and np.isfinite(rows.values[0, place]):
             values[name] = float(rows.values[0, place])
     return values

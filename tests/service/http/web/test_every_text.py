@@ -48,6 +48,7 @@ _CHOSEN = {
     *("cycle", "mean_speed_is", "balance", "balance_side", "phi_c", "drive.motor.kind", "drive.flywheel.kind"),
     *("drive.stages", "mechanism", "operation", *(f"operation.{name}" for name in OPERATION_CHOICES)),
     *(f"mechanism.{kind}.{name}" for kind, own in MECHANISM_CHOICES.items() for name in own),
+    *(f"mechanism.linkage.{name}" for name in ("elements", "working", "forward")),
     *(f"{part}.interpolation" for part in ("drive.torque", "mechanism", "operation")),
 }
 _NAMES = {*_CHOSEN, *SETTLED_RUN, *ANY_RUN, *ENDING_SENTENCES, *_CHOICES, "duration", "window", "drive"}

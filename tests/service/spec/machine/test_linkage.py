@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from sprag_study.service.exports.inputs import choices
 from sprag_study.service.http.views import preset_of
 from sprag_study.service.http.web.form.element_lines import element_of, elements_of, lines_of
 from sprag_study.service.http.web.form.machine_spec import base_of, values_of_base
@@ -80,6 +81,18 @@ def test_the_working_part_and_links_that_do_not_reach() -> None:
     (fault,) = error.value.faults
     assert (fault.where, fault.code) == ("/base/mechanism/linkage", "cannot-assemble")
     assert "the links of the group C (0.12 m and 0.13 m) are too short to go from A to B" in str(fault.message)
+
+
+def test_inputs_tell_what_elements_are_attached_to() -> None:
+    document = spec()
+    del linkage_of(document)["working"], document["base"]["operation"]
+    other = copy.deepcopy(document)
+    linkage_of(other)["elements"][1]["branch"] = "right"
+    texts, others = (choices(parse_spec(data).study, data) for data in (document, other))
+    elements = "mechanism.linkage.elements"
+    assert texts[elements] == "pivot B; RRR C (A, B, left); point D (C.first); RRP R (D, O, frame, ahead)"
+    assert texts["mechanism.linkage.working"] == "none"
+    assert {name for name in texts if texts[name] != others[name]} == {elements}
 
 
 def test_an_axis_names_an_element() -> None:
