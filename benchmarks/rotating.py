@@ -133,9 +133,9 @@ def main() -> None:
     exponents = batch.values[:, [info.name for info in settled_infos(1)].index("regime.exponent")]
     print(f"irregular with an exponent above 0.02: {np.count_nonzero(exponents > 0.02)}")
     off = np.array([missed(columns, batch, case) for case in np.flatnonzero(rotates).tolist()])
-    told = off[np.isfinite(off)]
-    print(f"compared with scipy: {len(told)}, largest deviation {told.max():.1e}")
-    print(f"with an event at the strobe: {len(off) - len(told)}")
+    compared = off[np.isfinite(off)]
+    print(f"compared with scipy: {len(compared)}, largest deviation {compared.max(initial=0.0):.1e}")
+    print(f"with an event at the strobe: {len(off) - len(compared)}")
 
 
 if __name__ == "__main__":

@@ -172,10 +172,8 @@ def _orders(strobes: Floats, matrix: Floats) -> Ints:
     """Least order of each case up to 64, by comparing the last strobes; 0: none."""
     cases, kept = len(strobes), 2 * _HIGHEST + 2
     last = np.ascontiguousarray(strobes[:, -kept:])
-    units, free = (
-        np.empty((cases, last.shape[2])),
-        turns_freely(matrix, (last.shape[2] - SHAFT_WIDTH) // PENDULUM_WIDTH),
-    )
+    units = np.empty((cases, last.shape[2]))
+    free = turns_freely(matrix, (last.shape[2] - SHAFT_WIDTH) // PENDULUM_WIDTH)
     orbits.find_units(last, np.arange(cases), kept, 40, matrix[:, 0].copy(), False, free, units)
     found = np.zeros(cases, dtype=np.int64)
     for case in range(cases):

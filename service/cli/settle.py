@@ -70,6 +70,7 @@ def settle(
     require_csv(None, decimal, "json" if in_json else "csv")
     study = _settled(study_named(spec, points_file, tables, db).study, at_most)
     cases = _chosen(study, case)
+    _require_settling(study, cases)
     with output(file) as write:
         blocks = _blocks(study, cases)
         if in_json:
@@ -105,6 +106,17 @@ def _chosen(study: Study, asked: list[int] | None) -> list[int]:
         return list(range(study.cases))
     require_cases(study, asked)
     return list(dict.fromkeys(asked))
+
+
+def _require_settling(study: Study, cases: list[int]) -> None:
+    """Raise WrongInputError where no motion is looked for to which one of the cases settles."""
+    import numpy as np
+
+    from sprag_study.service.views.portrait import SWINGS
+    from sprag_study.worker.models.vibration_drive.settled import swings
+
+    if swings({**study.base, **study.columns(np.array(cases, dtype=np.int64))}):
+        raise wrong_option("--case", "conflict", SWINGS, detail=_("this study cannot be settled"))
 
 
 def _blocks(study: Study, cases: list[int]) -> list[RowBlock]:

@@ -35,6 +35,8 @@ _WIDER: Final = 1.5
 
 #: Frequency of the excitation, in Hz, below which it is slow.
 _SLOW: Final = 0.1
+#: Parameters of the load of a vibration drive that mean nothing where another one is 0.
+_ONLY_WITH: Final = {"shaft.cyclic_load": "shaft.load", "shaft.stribeck_speed": "shaft.stribeck_load"}
 
 
 def warn_vibration_drive(report: Report, study: Study) -> None:
@@ -57,6 +59,9 @@ def warn_vibration_drive(report: Report, study: Study) -> None:
     if _values(study, "excitation.frequency").min() < _SLOW:
         slow = Sentence("below {limit}, which is slow for a vibration drive", limit=Amount(_SLOW, "Hz"))
         report.warn("slow-excitation", _place(study, "excitation.frequency"), slow)
+    for path, needed in _ONLY_WITH.items():
+        if _values(study, path).any() and needed not in study.column_paths and not study.base.get(needed, 0.0):
+            report.warn("no-effect", _place(study, path), Sentence("has no effect: {path} is 0", path=needed))
     pendulums = sum(path.startswith("pendulums.") and path.endswith(".mass") for path in study.base)
     _upright(report, study, pendulums)
     for index in range(pendulums):

@@ -21,7 +21,7 @@ from sprag_study.service.reading.units import QuantityError, typed_value
 from sprag_study.service.results.selection import axis_name, ends_of_range
 from sprag_study.service.views.case_questions import BRANCH, BranchQuestion
 from sprag_study.service.views.case_view import CaseAnswer, CaseView, Said
-from sprag_study.service.views.portrait import Strobed, require_strobes
+from sprag_study.service.views.portrait import Strobed, require_settling, require_strobes
 from sprag_study.service.views.setting import Offered
 from sprag_study.service.views.shown import Shown
 from sprag_study.worker import models
@@ -109,7 +109,8 @@ def range_of(
     Raises
     ------
     FaultError
-        About the parameters ``along``, ``from`` or ``to``, or because the machine has no strobes.
+        About the parameters ``along``, ``from`` or ``to``, because the machine has no strobes, or because the case does
+        not settle.
     """
     require_strobes(study)
     own = case_machine(study, case)
@@ -126,6 +127,7 @@ def range_of(
     if not paths:
         raise parameter_error("along", "required", "a branch needs a parameter", along, "the path of a parameter")
     paths = list(dict.fromkeys(paths))
+    require_settling(own, tuple(paths))
     value = own[paths[0]]
     for path in paths:
         if own[path] != value:

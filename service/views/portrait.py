@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
+from sprag_study.sentences import Sentence
 from sprag_study.service.answers.results import Portrait as PortraitData
-from sprag_study.service.faults import FaultError, choice_of
+from sprag_study.service.faults import FaultError, choice_of, parameter_error
 from sprag_study.service.figures.portrait import portrait_figure
 from sprag_study.service.languages import N_
 from sprag_study.service.results.regimes import motion_sentence
@@ -16,8 +17,11 @@ from sprag_study.service.views.shown import Shown
 from sprag_study.service.views.trajectory import timed_values, trajectory_csv
 from sprag_study.worker import models
 from sprag_study.worker.models import Portrait
+from sprag_study.worker.models.vibration_drive.settled import CYCLIC_LOAD, swings
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from sprag_study.service.figures.figure import Figure
     from sprag_study.worker.study import Study
 
@@ -27,6 +31,30 @@ def require_strobes(study: Study) -> None:
     if not models.has_strobes(study):
         message = f"A machine of model {study.model} has no excitation, so it has no strobes."
         raise FaultError("not-found", message)
+
+
+#: Why a case has no motion to which it settles.
+SWINGS: Final = Sentence(
+    "has a load that swings with the angle of the shaft ({path}), so that its motion does not repeat with the "
+    "vibration",
+    path=CYCLIC_LOAD,
+)
+
+
+def require_settling(values: Mapping[str, Any], along: tuple[str, ...] = ()) -> None:
+    """Raise FaultError where no motion is looked for to which a case settles.
+
+    Parameters
+    ----------
+    values : mapping
+        Parameters of the case.
+    along : tuple of str
+        Paths of the parameters along which the case is followed.
+    """
+    if swings(values):
+        raise parameter_error("case", "conflict", SWINGS)
+    if CYCLIC_LOAD in along:
+        raise parameter_error("along", "conflict", SWINGS, CYCLIC_LOAD)
 
 
 class Strobed:

@@ -19,7 +19,7 @@ from sprag_study.service.results.start_states import refuse_impossible
 from sprag_study.service.views.branch import ENDS_OFFERED, along_offered, named, range_of
 from sprag_study.service.views.case_questions import DIAGRAM, SECTION, DiagramQuestion, SectionQuestion
 from sprag_study.service.views.case_view import CaseAnswer, CaseView
-from sprag_study.service.views.portrait import Strobed, require_strobes
+from sprag_study.service.views.portrait import Strobed, require_settling, require_strobes
 from sprag_study.service.views.setting import Offered
 from sprag_study.worker.models.abilities import run_sections
 from sprag_study.worker.models.common import case_machine
@@ -78,9 +78,12 @@ def diagram_of(
 
 
 def section_of(study: Study, case: int, phase: str | None, count: int) -> Sampling:
-    """What a section asks for; FaultError about ``phase``, or where the machine has no strobes."""
+    """What a section asks for; FaultError about ``phase``, or where the machine has no strobes or the case does not
+    settle.
+    """
     require_strobes(study)
     own = case_machine(study, case)
+    require_settling(own)
     path = next(iter(own))
     return Sampling((path,), np.array([own[path]]), phase_of(phase), count)
 

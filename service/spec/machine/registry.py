@@ -6,7 +6,7 @@ A model that is not registered is described by its catalogue of parameters: plai
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from sprag_study.sentences import Sentence
 from sprag_study.service.languages import N_
@@ -24,6 +24,7 @@ from sprag_study.service.spec.schema.quantity import plain_schema
 from sprag_study.service.spec.warnings import warn_machine_shaft, warn_vibration_drive
 from sprag_study.worker import models
 from sprag_study.worker.derived import distinct_values
+from sprag_study.worker.models.vibration_drive.settled import CYCLIC_LOAD
 
 if TYPE_CHECKING:
     from sprag_study.service.spec.machine.machine import Machine
@@ -33,8 +34,6 @@ if TYPE_CHECKING:
 
     Axes = tuple[Axis, ...]
 
-_CYCLIC: Final = "shaft.cyclic_load"
-
 
 def _drive_run(run: Node, axes: Axes | None, combine: Combine) -> dict[str, Any]:
     path, machine = "excitation.frequency", run.machine
@@ -42,11 +41,11 @@ def _drive_run(run: Node, axes: Axes | None, combine: Combine) -> dict[str, Any]
         settings = read_run(run, distinct_values(layout(machine, axes, combine), path))
     else:
         settings = read_run(run, varied_values(path, axes, machine.values))
-    if models.is_settled(settings) and (_CYCLIC in machine.derive or _swings(machine, axes)):
+    if models.is_settled(settings) and (CYCLIC_LOAD in machine.derive or _swings(machine, axes)):
         message = Sentence(
             "cannot last until the motion is settled: a load that swings with the angle of the shaft ({path}) does not "
             "repeat with the vibration",
-            path=_CYCLIC,
+            path=CYCLIC_LOAD,
         )
         run.refuse("conflict", message, None, allowed=N_("a `duration`, such as 200 periods, or no cyclic load"))
     return settings
@@ -54,7 +53,7 @@ def _drive_run(run: Node, axes: Axes | None, combine: Combine) -> dict[str, Any]
 
 def _swings(machine: Machine, axes: Axes | None) -> bool:
     """Whether the load of some case swings with the angle of the shaft."""
-    return bool((varied_values(_CYCLIC, axes, machine.values) > 0.0).any())
+    return bool((varied_values(CYCLIC_LOAD, axes, machine.values) > 0.0).any())
 
 
 def _drive_check(report: Report, machine: Machine, axes: Axes, combine: Combine) -> None:

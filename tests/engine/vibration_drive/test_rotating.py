@@ -227,7 +227,7 @@ def test_views_of_a_rotating_pendulum_are_without_whole_turns() -> None:
     powers = results["excitation.power_x.mean"] + results["excitation.power_y.mean"]
     assert powers == pytest.approx(_value(batch, "power.input.mean"), rel=1e-9)
     assert results["pendulums.0.spring.force.max"] == 0.0
-    # A run of a given time whose window shows the rotation is settled; one that began to turn late is not.
+    # A run of a given time whose window shows the rotation is settled.
     run = Run(duration=Span(90), window=(Span(60), Span(90)))
     assert not simulate_judged(case, run, cases=1).off[0]
 

@@ -83,6 +83,20 @@ def test_what_cannot_be_settled_is_refused(sprag: Sprag, examples: Path, argumen
     assert done.out == ""
 
 
+def test_a_load_that_swings_with_the_angle_has_no_settled_motion(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
+    spec = json.loads((examples / _DRIVE).read_text(encoding="utf-8"))
+    spec["base"]["shaft"]["cyclic_load"] = 0.5
+    spec["run"] = {"duration": "40 periods"}
+    path = tmp_path / "spec.json"
+    path.write_text(json.dumps(spec), encoding="utf-8")
+    done = sprag("show", path, "settled", "--case", 178)
+    assert done.code == 2
+    assert "shaft.cyclic_load" in done.err
+    done = sprag("show", path, "diagram", "--case", 178, "--along", "excitation.frequency")
+    assert done.code == 2
+    assert "shaft.cyclic_load" in done.err
+
+
 def test_a_case_that_ends_otherwise_is_told(sprag: Sprag, examples: Path, tmp_path: Path) -> None:
     spec = json.loads((examples / _DRIVE).read_text(encoding="utf-8"))
     spec["base"]["pendulums"][0] |= {"spring_rate": 0, "damping": 0, "mass": 1e3, "arm": 1e3}

@@ -17,10 +17,12 @@ from sprag_study.service.results.selection import locate_axes, numeric_results, 
 from sprag_study.service.schedules.fields import read_fields
 from sprag_study.service.spec.document import parse_spec
 from sprag_study.service.views.branch import range_of
+from sprag_study.service.views.sections import section_of
 from sprag_study.worker import models
-from tests.service.spec_sample import SPEC
+from tests.service.spec_sample import SPEC, parsed
 
 STUDY = parse_spec(SPEC).study
+PRESS, NO_PRESS = (parsed({"/base/shaft/cyclic_load": share}).study for share in (0.2, 0.0))
 INFOS = models.study_results(STUDY)
 NOW = datetime(2026, 1, 1, tzinfo=UTC)
 
@@ -59,6 +61,12 @@ def schedule(**fields: object) -> Callable[[], object]:
         (lambda: range_of(STUDY, 0, "shaft.load", "1", "2"),
          "the range 1 .. 2 must contain the value of the case, 0.02",
          "діапазон 1 .. 2 мусить містити значення випадку, 0,02", "from <= 0.02 <= to"),
+        (lambda: range_of(PRESS, 0, "shaft.load"), "has a load that swings with the angle of the shaft",
+         "має навантаження, що коливається з кутом вала (shaft.cyclic_load)", ""),
+        (lambda: section_of(PRESS, 0, None, 4), "has a load that swings with the angle of the shaft",
+         "має навантаження, що коливається з кутом вала (shaft.cyclic_load)", ""),
+        (lambda: range_of(NO_PRESS, 0, "shaft.cyclic_load", "0", "1"), "has a load that swings with the angle",
+         "має навантаження, що коливається з кутом вала (shaft.cyclic_load)", ""),
         (lambda: plan_of(STUDY, ExploreQuery(where=("efficiency > x",))), "is not a range", "не є діапазоном",
          "NAME >= VALUE, наприклад shaft.load <= 2 N*m"),
         (schedule(cron="0 22"), "a cron expression has five fields: minute, hour,",

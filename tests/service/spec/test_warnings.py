@@ -124,6 +124,18 @@ def test_a_base_that_does_not_move() -> None:
     assert warnings(still | {"/axes": [{"path": "excitation.amplitude_x", "values": [0, 0.001]}]}) == []
 
 
+def test_a_part_of_a_load_that_is_not_there() -> None:
+    (share,) = warnings({"/base/shaft/cyclic_load": 0.5, "/base/shaft/load": 0})
+    assert share == "/base/shaft/cyclic_load: has no effect: shaft.load is 0"
+    (speed,) = warnings({"/base/shaft/stribeck_speed": "2 rad/s"})
+    assert speed == "/base/shaft/stribeck_speed: has no effect: shaft.stribeck_load is 0"
+    assert [code(warning) for warning in (share, speed)] == ["no-effect", "no-effect"]
+    assert warnings({"/base/shaft/cyclic_load": 0.5}) == []
+    assert warnings({"/base/shaft/stribeck_speed": "2 rad/s", "/base/shaft/stribeck_load": "0.1 N*m"}) == []
+    axes = [{"path": "shaft.load", "values": [0, 0.1]}]
+    assert warnings({"/base/shaft/cyclic_load": 0.5, "/base/shaft/load": 0, "/axes": axes}) == []
+
+
 def test_the_clutch_law_and_the_fit_have_their_say() -> None:
     (jump,) = warnings({"/base/clutch": {"coefficients": [0.5, 200]}})
     assert jump.startswith("/base/clutch: c_1 = 0.5 N*m")

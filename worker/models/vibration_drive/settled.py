@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, cast
 
+import numpy as np
+
 from sprag_study.engine.run import SettledRun
+from sprag_study.engine.vibration_drive.parameters import CYCLIC
 from sprag_study.engine.vibration_drive.regimes import Regime
 
 if TYPE_CHECKING:
@@ -14,6 +17,8 @@ if TYPE_CHECKING:
     from sprag_study.engine.run import Reset
     from sprag_study.worker.study import Study
 
+#: Path of the load that swings with the angle of the shaft. With it no motion is looked for to which a drive settles.
+CYCLIC_LOAD: Final = CYCLIC
 #: Value of "until" in `Study.run` for settled runs.
 SETTLED: Final = "settled"
 #: Value of the result "regime" of a motion that never repeats.
@@ -58,6 +63,11 @@ _FOLLOWED_TIMES, _FOLLOWED_PERIODS = 2.0, 120.0
 def is_settled(run: Mapping[str, Any]) -> bool:
     """Whether a run is settled."""
     return run.get("until") == SETTLED
+
+
+def swings(columns: Mapping[str, Any]) -> bool:
+    """Whether the load of any of some cases, given by their parameters, swings with the angle of the shaft."""
+    return bool(np.any(np.asarray(columns.get(CYCLIC_LOAD, 0.0), dtype=np.float64) > 0.0))
 
 
 def settings_of(run: Mapping[str, Any]) -> SettledRun:

@@ -35,6 +35,8 @@ from sprag_study.service.spec.kinds.registry import without_cases
 from sprag_study.service.spec.machine.shaft_check import NotCompiledError
 from sprag_study.service.spec.report import SpecError
 from sprag_study.worker import models
+from sprag_study.worker.models.common import case_machine
+from sprag_study.worker.models.vibration_drive.settled import swings
 from sprag_study.worker.pool.child_pool import JobStoppedError
 
 if TYPE_CHECKING:
@@ -56,7 +58,9 @@ _WIDTH: Final = 560
 
 
 def drawn_machine(values: Mapping[str, str]) -> tuple[Study, dict[str, Any]] | None:
-    """The machine of a form as a study of one case, with its spec; None while it has faults."""
+    """The machine of a form as a study of one case, with its spec; None while it has faults, and where it does not
+    settle.
+    """
     spec, _faults = spec_of(with_first_values(values))
     try:
         parsed = parse_spec({**without_cases(spec), "axes": []})
@@ -66,6 +70,8 @@ def drawn_machine(values: Mapping[str, str]) -> tuple[Study, dict[str, Any]] | N
         except SpecError:
             return None
     study = parsed.study
+    if swings(case_machine(study, 0)):
+        return None
     unsettled = models.has_strobes(study) and not models.is_settled(study.run)
     return (models.settled_study(study) if unsettled else study), parsed.spec
 

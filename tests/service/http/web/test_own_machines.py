@@ -46,6 +46,13 @@ def test_what_is_drawn_is_the_machine_as_it_stands_in_the_form() -> None:
     assert drawn_machine(values_of(DRIVE) | {"/base/shaft/load": "0.25 mm"}) is None
 
 
+def test_a_drive_without_settled_motion_is_not_drawn() -> None:
+    """A load that swings with the angle of the shaft; where it does not, the run of the form is settled."""
+    values = values_of({**DRIVE, "run": {"duration": "40 periods"}})
+    assert drawn_machine(values | {"/base/shaft/cyclic_load": "0"}) is not None
+    assert drawn_machine(values | {"/base/shaft/cyclic_load": "0.5"}) is None
+
+
 def _sent(service: Service, address: str) -> dict[str, str]:
     answer = service.http.get(address, follow_redirects=True)
     assert answer.status_code == 200, answer.text
