@@ -84,6 +84,34 @@ def test_the_torque_on_the_crank_is_that_of_the_reduced_machine(name: str) -> No
     assert names == every
 
 
+@pytest.mark.parametrize("name", list(CHAINS))
+def test_derivatives_are_those_of_the_places(name: str) -> None:
+    """Of every joint and link, also on guides that turn, by differences of the places."""
+    engine, numbers = case_of(name)
+    phi, v = np.linspace(0.05, 6.2, 50), arrays(numbers)
+
+    def columns(angles: Array) -> dict[str, tuple[Array, Array, Array]]:
+        """Places of joints and directions of links with their two derivatives, shape (2, angles)."""
+        pose = engine.pose(v, angles[None, None, :])
+        parts = {name: tuple((own.x, own.y) for own in place) for name, place in pose.joints.items()}
+        for link, own in pose.links.items():
+            ahead, turn1 = own.direction.ahead, own.turn1
+            first, second = ahead * turn1, ahead * own.turn2 - own.direction * turn1**2
+            parts[link] = tuple((each.x, each.y) for each in (own.direction, first, second))
+        shape = (1, 1, len(angles))
+        flat = {
+            name: [np.array([np.broadcast_to(x, shape)[0, 0] for x in pair]) for pair in own]
+            for name, own in parts.items()
+        }
+        return {name: (own[0], own[1], own[2]) for name, own in flat.items()}
+
+    for label, (_, first, second) in columns(phi).items():
+        by_first = chains.slope(lambda angles, label=label: columns(angles)[label][0], phi)
+        by_second = chains.slope(lambda angles, label=label: columns(angles)[label][1], phi)
+        assert first == pytest.approx(by_first, abs=1e-9 * (1.0 + np.abs(first).max())), label
+        assert second == pytest.approx(by_second, abs=1e-9 * (1.0 + np.abs(second).max())), label
+
+
 def motions(choice: LinkageChoice, v: Numbers, at: float) -> list[Any]:
     """Mass, inertia, centre and accelerations (x, y, angle) of every body."""
     phi = np.array([at])
