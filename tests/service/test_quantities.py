@@ -14,8 +14,10 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from scipy.interpolate import PchipInterpolator
+from starlette.datastructures import QueryParams
 
 from sprag_study.service.client import Client
+from sprag_study.service.http.web.comparison.chosen import comparison
 from sprag_study.worker import models
 from sprag_study.worker.models import ChunkResult
 from sprag_study.worker.rounds import Rounds
@@ -124,6 +126,18 @@ def test_studies_with_other_quantities_reuse_the_rows(filled: Any, spec: dict[st
         study = store.work.study_of(number)
         known = [store.reuse.known(study, chunk) for chunk in store.work.open_chunks(number)]
         assert [item is not None and item.missing.size for item in known] == [0, 0, 0]
+
+
+def test_quantities_of_one_name_and_different_dimensions_are_not_compared(
+    service: Service, spec: dict[str, Any]
+) -> None:
+    spec["axes"] = [{"path": "shaft.load", "values": [0.1, 0.2]}]
+    asked = ({"margin": "torque.max", "price": "1 + gravity / (1 m/s^2)"}, {"margin": "shaft.speed.mean", "price": "2"})
+    ids = [service.submit({**spec, "quantities": quantities}) for quantities in asked]
+    found = comparison(service.store, QueryParams(), [service.store.studies.get(study_id) for study_id in ids])
+    names = [info.name for info in found.results]
+    assert "price" in names
+    assert "margin" not in names
 
 
 def batch_rows(study: Study, cases: range) -> ChunkResult:

@@ -109,9 +109,10 @@ def comparison(store: Store, given: QueryParams, records: list[StudyRecord]) -> 
     axes = common_axes([[(axis.paths, len(axis)) for axis in study.axes] for study in studies])
     if any(asked_by(study) in ("best", "measured") for study in studies):  # their cases lie on no curves
         axes = []
-    known = [{info.name for info in models.study_results(study)} for study in studies]
+    # Quantities of one name may be of different dimensions.
+    known = [{(info.name, info.unit) for info in models.study_results(study)} for study in studies]
     infos = models.study_results(studies[0])
-    results = [info for info in infos if all(info.name in names for names in known)]
+    results = [info for info in infos if all((info.name, info.unit) in own for own in known)]
     if not axes or not results:
         raise refused("study", "nothing-in-common", _nothing_in_common(studies, some_axis=bool(axes)))
     main = main_query(studies[0])
