@@ -83,10 +83,8 @@ def examined(columns: Mapping[str, ArrayLike], run: Run) -> Examined:
     """
     frequency = float(np.asarray(columns["excitation.frequency"]))
     last = run.duration.in_periods(frequency)
-    start, end = run.window_in_periods(frequency)
-    end = min(end, last)
-    since = first_period(last)
-    start = min(max(start, since), end)
+    since = _first_period(last)
+    start, end = examined_window(run, frequency)
     module = kernel_of(columns, run.tolerance)
     matrix = case_matrix(columns, run, 1)
     record = read_steps(module, matrix, run, since, last - since)
@@ -147,7 +145,17 @@ def examined_motion(columns: Mapping[str, ArrayLike], settings: SettledRun, sett
     return Examined(begin * period, end, name, ending, period, 0, begin, begin + length, steps, steps, losses)
 
 
-def first_period(last: float) -> float:
+def examined_window(run: Run, frequency: float) -> tuple[float, float]:
+    """Start and end, in excitation periods at ``frequency`` (Hz), of the part of a run that is examined: its window, of
+    a run longer than ``MAX_PERIODS`` within its last periods only.
+    """
+    last = run.duration.in_periods(frequency)
+    start, end = run.window_in_periods(frequency)
+    end = min(end, last)
+    return min(max(start, _first_period(last)), end), end
+
+
+def _first_period(last: float) -> float:
     """The first excitation period that is examined of a run of ``last`` periods."""
     return max(0.0, float(np.ceil(last)) - MAX_PERIODS)
 

@@ -17,7 +17,7 @@ from sprag_study.engine.outcome import Forces, Trajectory
 from sprag_study.engine.quadrature import gauss
 from sprag_study.engine.run import Run, SettledRun
 from sprag_study.engine.vibration_drive.cases import case_matrix, default_of, scalars, with_lengths
-from sprag_study.engine.vibration_drive.examined import first_period, read_steps
+from sprag_study.engine.vibration_drive.examined import examined_window, read_steps
 from sprag_study.engine.vibration_drive.force_results import Bearing, force_infos
 from sprag_study.engine.vibration_drive.formulas import base_series, drive, free_acceleration
 from sprag_study.engine.vibration_drive.kernel import kernel_of
@@ -52,11 +52,7 @@ def forces(columns: Mapping[str, ArrayLike], run: Run, bearing: Bearing, points:
         If a required parameter is missing or the number of pendulums or coefficients is out of range.
     """
     values = scalars(columns)
-    frequency = values["excitation.frequency"]
-    last = run.duration.in_periods(frequency)
-    start, end = run.window_in_periods(frequency)
-    end = min(end, last)
-    start = min(max(start, first_period(last)), end)
+    start, end = examined_window(run, values["excitation.frequency"])
     since = float(np.floor(start))
     matrix = case_matrix(values, run, 1)
     return _forces(values, run, matrix, None, (since, start, end), bearing, points, "")

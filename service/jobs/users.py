@@ -4,7 +4,7 @@ database.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any, Final
@@ -178,10 +178,18 @@ def user_json(people: People, record: UserRecord) -> User:
     return filled(User, record, quota=quota_json(people, record.name, record.quota), **own)
 
 
-def token_json(people: People, record: TokenRecord) -> Token:
-    """A token as JSON data."""
-    owner = next((user for user in people.users() if user.name == record.owner), None)
-    return filled(Token, record, user=record.owner, state=record.state_at(people.clock.now(), owner).value)
+def tokens_json(people: People, records: Iterable[TokenRecord]) -> list[Token]:
+    """Tokens as JSON data."""
+    now, owners = people.clock.now(), {user.name: user for user in people.users()}
+    return [
+        filled(Token, record, user=record.owner, state=record.state_at(now, owners.get(record.owner or "")).value)
+        for record in records
+    ]
+
+
+def _token_json(people: People, record: TokenRecord) -> Token:
+    (token,) = tokens_json(people, [record])
+    return token
 
 
 class StoredUsers:
@@ -208,7 +216,7 @@ class StoredUsers:
 
     def tokens(self) -> list[Token]:
         """Every token, newest first."""
-        return [token_json(self._people, record) for record in self._people.tokens()]
+        return tokens_json(self._people, self._people.tokens())
 
     def create_token(self, name: str, **fields: Any) -> CreatedToken:
         """Create a token; raises SpecError, and as `People.create_token`."""
@@ -223,12 +231,12 @@ def created(people: People, token: NewToken) -> CreatedToken:
     """Create a token; raises as `People.create_token`."""
     ends = None if token.days is None else people.clock.now() + timedelta(days=token.days)
     secret, record = people.create_token(token.name, token.scope, owner=token.owner, expires_at=ends)
-    return {**token_json(people, record), "token": secret}
+    return {**_token_json(people, record), "token": secret}
 
 
 def revoked(people: People, token_id: str) -> Token:
     """Revoke a token; raises TokenNotFoundError."""
-    return token_json(people, people.revoke_token(token_id))
+    return _token_json(people, people.revoke_token(token_id))
 
 
 def added(people: People, user: NewUser) -> User:

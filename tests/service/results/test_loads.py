@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import sprag_study
 from sprag_study.service.client import Client
 from sprag_study.service.http.web.form.page import empty
 from sprag_study.service.http.web.form.spec import spec_of, values_of
@@ -150,6 +151,18 @@ def test_studies_without_them_are_those_of_before() -> None:
     assert models.variant_of(study_of(LOADS)) == "1-settled-loads"
 
 
+def test_the_estimate_counts_the_periods_that_they_examine() -> None:
+    def longer(start: int, end: int) -> float:
+        study = study_of({**LOADS, "duration": "2000 periods", "window": [f"{start} periods", f"{end} periods"]})
+        return models.estimate_seconds_per_case(study) - models.estimate_seconds_per_case(study_without(study))
+
+    nothing = longer(0, 100)  # only the last 500 periods are examined
+    each = longer(1990, 2000) - nothing
+    assert each > 0.0
+    assert longer(1800, 2000) - nothing == pytest.approx(20.0 * each)
+    assert longer(0, 2000) - nothing == pytest.approx(50.0 * each)
+
+
 def test_a_goal_needs_them_in_the_run() -> None:
     goal = {
         "vary": [{"path": "shaft.load", "from": "0.1 N*m", "to": "0.5 N*m"}],
@@ -167,6 +180,19 @@ def test_a_goal_needs_them_in_the_run() -> None:
     assert (limit["result"], limit["at_least"]) == ("pendulums.0.duty.torque_margin", 1.5)
     with pytest.raises(SpecError, match="must be true or false"):
         parse_spec(spec({"loads": "yes"}))
+
+
+@pytest.mark.parametrize("run", [{}, LOADS])
+def test_a_goal_of_a_pendulum_that_is_not_there_is_of_an_unknown_result(run: dict[str, Any]) -> None:
+    goal = {"vary": [{"path": "shaft.load", "from": 0.1, "to": 0.5}], "best": [{"result": "pendulums.1.force.max"}]}
+    with pytest.raises(SpecError, match="/goal/best/0/result: unknown result"):
+        parse_spec(spec(run, goal=goal))
+
+
+def test_a_machine_shaft_is_not_told_to_have_them() -> None:
+    shaft = sprag_study.preset("least_flywheel")
+    with pytest.raises(SpecError, match="/goal/best/0/result: unknown result"):
+        parse_spec({**shaft, "goal": {**shaft["goal"], "best": [{"result": "table.force.rms"}]}})
 
 
 def test_a_refinement_may_follow_a_force() -> None:

@@ -17,10 +17,11 @@ from sprag_study.worker.models.starts import count_of
 from sprag_study.worker.models.vibration_drive.settled import settings_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from numpy.typing import NDArray
 
+    from sprag_study.engine.catalogue import ResultInfo
     from sprag_study.engine.outcome import Batch
     from sprag_study.engine.run import Run
     from sprag_study.engine.vibration_drive.settle import SettledBatch
@@ -31,8 +32,9 @@ if TYPE_CHECKING:
 
 #: Name of the field in `Study.run`.
 LOADS: Final = "loads"
-#: Seconds that they take in a case for each pendulum (benchmarks/loads.py).
-_SECONDS_EACH = 0.016
+#: Seconds that they take for each pendulum: in a case, and besides for each period that they examine of a timed run
+#: (benchmarks/loads.py).
+_SECONDS_EACH, _SECONDS_OF_PERIOD = 0.016, 0.003
 
 
 def has_loads(run: Mapping[str, Any]) -> bool:
@@ -40,11 +42,14 @@ def has_loads(run: Mapping[str, Any]) -> bool:
     return bool(run.get(LOADS, False))
 
 
-def loads_seconds(run: Mapping[str, Any], pendulums: int) -> float:
-    """Rough time that they take in a case, in s; of a case with starts for two regimes."""
+def loads_seconds(run: Mapping[str, Any], pendulums: int, periods: float) -> float:
+    """Rough time that they take in a case, in s; of a case with starts for two regimes.
+
+    ``periods`` are the excitation periods that they examine of a run of a given time; 0 for settled motion.
+    """
     if not has_loads(run):
         return 0.0
-    return _SECONDS_EACH * pendulums * min(2, count_of(run))
+    return (_SECONDS_EACH + _SECONDS_OF_PERIOD * periods) * pendulums * min(2, count_of(run))
 
 
 def with_settled_loads(task: ChunkTask, settled: SettledBatch) -> Floats:
@@ -83,3 +88,10 @@ _NAMES: Final = frozenset(general_path(info.name) for info in load_infos(1))
 def is_load(name: str) -> bool:
     """Whether a result of that name is one of forces or duty."""
     return general_path(name) in _NAMES
+
+
+def lacks_loads(name: str, infos: Iterable[ResultInfo]) -> bool:
+    """Whether a study with the results ``infos`` would have one of that name if its run had forces and duty."""
+    known = {info.name for info in infos}
+    pendulums = len({own.split(".")[1] for own in known if own.startswith("pendulums.")})
+    return pendulums > 0 and name not in known and name in {info.name for info in load_infos(pendulums)}

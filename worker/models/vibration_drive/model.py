@@ -221,6 +221,16 @@ def _mean_periods(study: Study) -> float:
     return periods + followed_periods(periods)
 
 
+def _examined_periods(study: Study) -> float:
+    """Excitation periods of a case that forces and duty examine in a run of a given time; 0 for settled motion."""
+    if is_settled(study.run) or not has_loads(study.run):
+        return 0.0
+    from sprag_study.engine.vibration_drive.examined import examined_window
+
+    start, end = examined_window(run_of(study.run), float(np.mean(_frequencies(study))))
+    return end - start
+
+
 def _frequencies(study: Study) -> NDArray[np.float64]:
     """Excitation frequencies of the study, Hz; where they are derived, those of cases evenly spread over it."""
     if "excitation.frequency" in study.derive:
@@ -356,7 +366,7 @@ class VibrationDrive(Model):
         period = float(np.mean(1.0 / _frequencies(study)))
         key = _key_of(self.shape_of(study))
         seconds = estimate_seconds(key.pendulums, key.coefficients, key.tolerance, _mean_periods(study), period)
-        return seconds + loads_seconds(study.run, key.pendulums)
+        return seconds + loads_seconds(study.run, key.pendulums, _examined_periods(study))
 
     def estimate_compile_seconds(self, shape: KernelShape) -> float:
         """On one core: 7 s for the kernel of one pendulum, 13 s for eight; 3.7 s for the search of settled motions."""
