@@ -21,6 +21,8 @@ from sprag_study.engine.taylor.straight import (
     Term,
     exp2,
     exponential,
+    horner,
+    larger,
     log2,
     product,
     same_everywhere,
@@ -39,6 +41,8 @@ STEP_SAFETY = 0.66
 LONGEST_STEP = 0.25
 #: Share of the base's largest drive that counts as motion in any case when a step's error is weighed.
 DRIVE_SHARE = 1e-3
+#: Speed of the shaft over that of a load that falls with it, from which on the load is nothing: e^-60 of that at rest.
+NOTHING = 60.0
 
 
 class _Pendulum:
@@ -184,7 +188,7 @@ def series_loop(layout: Layout) -> str:
                 p.w.append(code.let(f"w{i}_{k + 1}", f"a{i}_{k}*{1.0 / (k + 1)!r}"))
                 p.phi.append(code.let(f"phi{i}_{k + 1}", f"{p.w[k]}*{1.0 / (k + 1)!r}"))
                 p.u.append(code.let(f"u{i}_{k + 1}", f"({p.w[k]} - {shaft[k]})*{1.0 / (k + 1)!r}"))
-    _step_size(code, layout, pendulums, shaft)
+    _step_size(code, layout, pendulums, shaft, bent)
     _in_fractions(code, order, pendulums, shaft, curve)
     _store_series(code, layout, pendulums, shaft)
     for k, term in enumerate(curve):
@@ -223,6 +227,20 @@ class _Curve:
         self.series.append(code.let(f"B{k}", f"{self.falling[k]} + {self.cyclic}*{self.cosine[k]}"))
 
 
+def _watched(code: LaneCode, step: Term, bent: _Curve, shaft: list[Term], order: int) -> str:
+    """The part of a step in which the last coefficients of a load that falls with the speed show what it misses.
+
+    Far above omega_s the load is nothing, and so are its coefficients, whatever it is at the end of the step. Its
+    exponent changes by as much as the order at most, where the last of its terms is a tenth of all that are left out,
+    or remains where the load is nothing.
+    """
+    decay = code.let("falls_at", f"{bent.decay} if {bent.falls} > 0.0 else 0.0")
+    rates = [code.let("size", f"abs({term})") for term in shaft[1:]]
+    change = code.let("change", f"{decay}*{step}*({horner(rates, step)})")
+    most = code.let("most_change", larger(repr(float(order)), f"{decay}*{shaft[0]} - {NOTHING!r}"))
+    return f"{step}*{most}/({change} + 1e-300) if {change} > {most} else {step}"
+
+
 def _in_fractions(code: LaneCode, order: int, pendulums: list[_Pendulum], shaft: list[Term], curve: list[Term]) -> None:
     """Rescale every series from seconds to fractions of the step: coefficient k times h^k."""
     power = "h"
@@ -252,7 +270,9 @@ def _store_series(code: LaneCode, layout: Layout, pendulums: list[_Pendulum], sh
                 code.store(p.row(layout, "drive") + k, p.drive[k])
 
 
-def _step_size(code: LaneCode, layout: Layout, pendulums: list[_Pendulum], shaft: list[Term]) -> None:
+def _step_size(
+    code: LaneCode, layout: Layout, pendulums: list[_Pendulum], shaft: list[Term], bent: _Curve | None
+) -> None:
     """Step from the last two coefficients of every speed, relative to the size of that speed's motion."""
     order = layout.order
     code.load("inverse_rate", layout.inverse_rate)
@@ -283,7 +303,8 @@ def _step_size(code: LaneCode, layout: Layout, pendulums: list[_Pendulum], shaft
     code.let("followed", f"{0.5 / math.pi!r}*({followed})")
     longest = code.let("longest", f"({smaller('followed', repr(LONGEST_STEP))})*period")
     code.store(layout.h_free, "h_free")
-    code.let("h_wanted", smaller("h_free", longest))
+    wanted = smaller("h_free", longest)
+    code.let("h_wanted", wanted if bent is None else _watched(code, code.let("h_smooth", wanted), bent, shaft, order))
     # A stop barely after the step's end is included in the step instead of leaving a step of rounding size.
     code.store(layout.at_stop, f"0.0 if h_wanted < {rest}*0.999999 else 1.0")
     code.let("h", f"h_wanted if h_wanted < {rest}*0.999999 else {rest}")

@@ -111,6 +111,16 @@ def test_stribeck_run_down() -> None:
     assert row["power.useful.max"] == pytest.approx(torque * scale / math.e, rel=1e-9)
 
 
+@pytest.mark.parametrize("scale", [1.0, 0.01, 1e-3, 1e-6])
+def test_a_load_that_acts_at_the_end_of_a_run_down_only(scale: float) -> None:
+    """Beside a dry load w + omega_s ln(1 + (M_s/M_c) exp(-w/omega_s)) falls in proportion to the time."""
+    dry, torque = 0.06, 0.3
+    stop = J_E / dry * (30.0 - scale * math.log((1.0 + torque / dry) / (1.0 + torque / dry * math.exp(-30.0 / scale))))
+    columns = running_down(**{"shaft.load": dry, "shaft.stribeck_load": torque, "shaft.stribeck_speed": scale})
+    row = one(columns, Run(duration=Span(1.5 * stop, "s"), window=(Span(0.0, "s"), Span(1.5 * stop, "s"))))
+    assert 1.5 * (1.0 - row["fraction.held"]) == pytest.approx(1.0, rel=1e-10)
+
+
 def test_run_down_against_a_cyclic_load() -> None:
     """The work against the load up to an angle is what the shaft has lost."""
     load, share, cycles, phase = 0.05, 0.8, 3.0, 0.4
