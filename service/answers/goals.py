@@ -20,7 +20,14 @@ class DesignVariable(TypedDict):
     values: Annotated[list[float], Doc("the listed values, SI; empty for a range")]
 
 
-class DesignGoal(TypedDict):
+class Counted(TypedDict):
+    """At which operating points a goal or a limit counts, and how, where that is not as usual."""
+
+    points: NotRequired[Annotated[list[int], Doc("the operating points that count, from 0; left out: all")]]
+    over: NotRequired[Annotated[str, Doc("what counts of several points: worst, mean or best; left out: as usual")]]
+
+
+class DesignGoal(Counted):
     """What is to be as small or as large as possible."""
 
     result: Annotated[str, Doc("a result, its quantile over the drives, or a yield; the name in `goals` and `results`")]
@@ -39,6 +46,8 @@ DesignLimit = TypedDict(
         "at_least": NotRequired[Annotated[float, Doc("SI")]],
         "at_most": NotRequired[Annotated[float, Doc("SI")]],
         "within": Annotated[float, Doc("half the width of the band around `is`, SI; 0 where it must be equal")],
+        "points": NotRequired[Annotated[list[int], Doc("the operating points that count, from 0; left out: all")]],
+        "over": NotRequired[Annotated[str, Doc("mean or best: that of the points must keep it; left out: each")]],
     },
 )
 DesignLimit.__doc__ = "The limits that a design must keep at every operating point."
@@ -93,7 +102,10 @@ class FrontReport(TypedDict):
     best: list[DesignGoal]
     subject_to: list[DesignLimit]
     at: Annotated[list[dict[str, float]], Doc("the operating points, SI; a single empty one for that of the base")]
-    over: Annotated[str, Doc("what counts of several operating points: worst or mean")]
+    names: NotRequired[
+        Annotated[list[str], Doc("names of the operating points, empty for one without; left out: none")]
+    ]
+    over: Annotated[str, Doc("what counts of several operating points: worst, mean or best")]
     generations: Annotated[int, Doc("generations at most")]
     counts: Annotated[
         dict[str, int],

@@ -10,7 +10,15 @@ import numpy as np
 
 from sprag_study.sentences import Amount, Name
 from sprag_study.service import exports
-from sprag_study.service.answers.goals import Design, DesignGoal, DesignLimit, DesignVariable, FrontReport, Generation
+from sprag_study.service.answers.goals import (
+    Counted,
+    Design,
+    DesignGoal,
+    DesignLimit,
+    DesignVariable,
+    FrontReport,
+    Generation,
+)
 from sprag_study.service.faults import Fault, FaultError
 from sprag_study.service.json_text import numbers
 from sprag_study.service.languages import N_
@@ -20,7 +28,7 @@ from sprag_study.service.results.explore import Further
 from sprag_study.service.results.regimes import kind_columns
 from sprag_study.worker import models
 from sprag_study.worker.models import WorkerEnding
-from sprag_study.worker.planning.goals import GoalPlan, front
+from sprag_study.worker.planning.goals import GoalPlan, front, taken
 from sprag_study.worker.planning.goals.plan import GOAL
 from sprag_study.worker.planning.goals.polish import MET
 from sprag_study.worker.planning.goals.record import serve_derivatives
@@ -159,7 +167,7 @@ def designs_of(study: Study, rounds: list[RoundRecord], fetch: Fetch, *, exact: 
         numbers=numbers_,
         front=found,
         exact=found.feasible & (found.miss <= MET),
-        values={item.name: table.values(item) for item in plan.items},
+        values={item.name: _where_counted(item, table.values(item)) for item in plan.items},
         order=np.lexsort((numbers_, goal, found.rank)),
         rounds=rounds,
         round=np.searchsorted([record.cases.start for record in rounds], found.cases[:, 0], side="right") - 1,
@@ -167,6 +175,15 @@ def designs_of(study: Study, rounds: list[RoundRecord], fetch: Fetch, *, exact: 
         regimes=None if regime is None else _regimes(regime, values[regime.name].reshape(-1, each)[:, ::drives]),
         flags=[list(dict.fromkeys(name for text in own for name in text.split(",") if name)) for own in flags],
     )
+
+
+def _where_counted(item: Goal | Limit, values: Floats) -> Floats:
+    """Values at the operating points that count for a goal or a limit, shape (designs, points), NaN at all others."""
+    if not item.at:
+        return values
+    counted = np.full_like(values, np.nan)
+    counted[:, list(item.at)] = values[:, list(item.at)]
+    return counted
 
 
 def _regimes(regime: ResultInfo, codes: Floats) -> list[list[str | None]]:
@@ -196,13 +213,15 @@ def infos_of(study: Study, plan: GoalPlan) -> dict[str, ResultInfo]:
             found[item.name] = replace(info, name=item.name, kind="real", description=text)
         else:
             found[item.name] = known[item.result]
+        if item.at or item.over:
+            found[item.name] = replace(found[item.name], name=item.name)
     return found
 
 
 def front_json(study_id: str, found: Designs, limit: int = DESIGNS) -> FrontReport:
     """The designs as an answer, at most ``limit`` of them."""
     plan, infos = found.plan, found.infos
-    return {
+    report: FrontReport = {
         "study": study_id,
         "variables": _variables(found),
         "best": [
@@ -211,6 +230,7 @@ def front_json(study_id: str, found: Designs, limit: int = DESIGNS) -> FrontRepo
                 unit=infos[goal.name].unit,
                 description=infos[goal.name].description,
                 max=goal.max,
+                **_counted(goal),
             )
             for goal in plan.best
         ],
@@ -222,6 +242,9 @@ def front_json(study_id: str, found: Designs, limit: int = DESIGNS) -> FrontRepo
         "designs": [design_json(found, int(position)) for position in found.order[:limit]],
         "history": history(found.rounds),
     }
+    if plan.names:
+        report["names"] = list(plan.names)
+    return report
 
 
 def _variables(found: Designs) -> list[DesignVariable]:
@@ -240,8 +263,14 @@ def _variables(found: Designs) -> list[DesignVariable]:
 
 def _limit(limit: Limit, info: ResultInfo) -> DesignLimit:
     value = info.cell(limit.value)
-    named: Any = {"result": info.name, "unit": info.unit, limit.kind: value, "within": limit.within}
+    named: Any = {"result": info.name, "unit": info.unit, limit.kind: value, "within": limit.within, **_counted(limit)}
     return cast("DesignLimit", named)
+
+
+def _counted(item: Goal | Limit) -> Counted:
+    """At which operating points a goal or a limit counts, and how, where that is not as usual."""
+    counted: Counted = {"points": list(item.at)} if item.at else {}
+    return {**counted, "over": item.over} if item.over else counted
 
 
 def design_json(found: Designs, position: int) -> Design:
@@ -273,16 +302,22 @@ def design_json(found: Designs, position: int) -> Design:
 def worst_of(limit: Limit, values: Floats) -> Floats:
     """What is farthest on the wrong side of a limit among the operating points of each design; shape (designs,).
 
-    ``values`` have the shape (designs, operating points); a missing one is the worst.
+    ``values`` have the shape (designs, operating points); a missing one is the worst. Of a limit on the mean or the
+    best of the points it is that.
     """
+    if limit.over:
+        return taken(limit, values, limit.over)
     return np.asarray(values[np.arange(len(values)), worst_places(limit, values)])
 
 
 def worst_places(limit: Limit, values: Floats) -> NDArray[np.intp]:
-    """The operating points of `worst_of`, shape (designs,)."""
+    """The operating points of `worst_of`, shape (designs,), among those that count."""
     signs = {"at_least": -1.0, "at_most": 1.0}
     off = signs[limit.kind] * values if limit.kind in signs else np.abs(values - limit.value)
-    return np.asarray(np.where(np.isnan(values), np.inf, off).argmax(axis=1))
+    off = np.where(np.isnan(values), np.inf, off)
+    if limit.at:
+        off[:, [place for place in range(off.shape[1]) if place not in limit.at]] = -np.inf
+    return np.asarray(off.argmax(axis=1))
 
 
 def further_of(found: Designs) -> Further:
@@ -338,7 +373,7 @@ def front_csv(found: Designs, study: Study, shown: Units, limit: int = DESIGNS) 
     plan, points = found.plan, range(1, len(found.plan.at) + 1)
     about = ("round", "phase", "rank", "feasible", "failed", "exact", "violation", "miss")
     header = ["design", "case", *about, *(one.paths[0] for one in plan.vary)]
-    header += [f"{plan.over}.{goal.name}" for goal in plan.best if len(points) > 1]
+    header += [f"{goal.over or plan.over}.{goal.name}" for goal in plan.best if len(points) > 1]
     header += [name if len(points) == 1 else f"{name}.{number}" for name in found.values for number in points]
     own = found.regimes is not None and not any(item.result == "regime" for item in plan.items)
     header += ["regime" if len(points) == 1 else f"regime.{number}" for number in points if own] + ["flags"]
@@ -351,7 +386,7 @@ def front_csv(found: Designs, study: Study, shown: Units, limit: int = DESIGNS) 
         rows.append([*row, *(design["regimes"] if own else ()), " ".join(design["flags"])])
     columns = dict(zip(header, zip(*rows, strict=True) if rows else [()] * len(header), strict=True))
     units = {one.paths[0]: unit_of(study, one.paths[0]) for one in plan.vary}
-    units |= dict(zip((f"{plan.over}.{goal.name}" for goal in plan.best), goal_units(study), strict=True))
+    units |= dict(zip((f"{goal.over or plan.over}.{goal.name}" for goal in plan.best), goal_units(study), strict=True))
     units |= {
         name: found.infos[name.removesuffix(f".{number}")].unit
         for number in points

@@ -57,7 +57,7 @@ class Studies(Draft):
         subject_to: Results | None = None,
         at: Sequence[Any] | None = None,
         start: Sequence[Any] | None = None,
-        over: Literal["worst", "mean"] | None = None,
+        over: Literal["worst", "mean", "best"] | None = None,
         population: int | None = None,
         generations: int | None = None,
         seed: int | None = None,
@@ -75,12 +75,13 @@ class Studies(Draft):
         subject_to : values, optional
             What a feasible design must fulfil.
         at : values, optional
-            Parameters of each operating point; by default one, that of the base.
+            Parameters of each operating point, and its `name` if it has one; by default one, that of the base; fields
+            name.
         start : values, optional
             Known designs, which the first generation has: the values of what varies, by default those of `base`: {} is
             the design of `base`.
         over : values, optional
-            What counts of several operating points: the worst one, or the mean.
+            What counts of several operating points: the worst one, the mean, or the best one.
         population : int, optional
             Designs of one generation.
         generations : int, optional

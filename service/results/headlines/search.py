@@ -10,7 +10,7 @@ import numpy as np
 from sprag_study.sentences import Amount, Name
 from sprag_study.service.reading.catalogue import unit_of
 from sprag_study.service.reading.reader import Phrase, joined, plural, term
-from sprag_study.service.results.fronts import history, worst_places
+from sprag_study.service.results.fronts import history, worst_of, worst_places
 from sprag_study.service.results.headlines.headline import (
     DIMENSION_DIGITS,
     MOST,
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from sprag_study.service.results.fronts import Designs
     from sprag_study.worker.models.presentation import Better
-    from sprag_study.worker.planning.goals import Limit
+    from sprag_study.worker.planning.goals import Goal, Limit
 
 #: Relative change of the best value that counts as an improvement.
 _BETTER: Final = 1e-3
@@ -99,24 +99,33 @@ def _goal(found: Designs, best: int, place: int) -> KeyNumber:
     known = value if np.isfinite(value) else None
     unit, case = info.unit, int(found.front.cases[best, 0])
     better: Better = "larger" if found.plan.best[place].max else "smaller"
-    return KeyNumber(name, known, unit, digits(value), where=_points(found), case=case, better=better)
+    return KeyNumber(
+        name, known, unit, digits(value), where=_points(found, found.plan.best[place]), case=case, better=better
+    )
 
 
-def _points(found: Designs) -> Phrase:
-    """Over how many operating points a goal is taken."""
-    count = len(found.plan.at)
-    if count == 1:
+def _points(found: Designs, item: Goal | Limit) -> Phrase:
+    """Over how many operating points a goal, or a limit that does not ask each, is taken."""
+    places = item.at or range(len(found.plan.at))
+    count, over = len(places), item.over or found.plan.over
+    if len(found.plan.at) == 1:
         return NOTHING
-    if found.plan.over == "mean":
+    if count == 1:
+        return Phrase("at {place}", place=_point(found, places[0]))
+    if over == "mean":
         taken = plural("mean of {count} operating point", "mean of {count} operating points", count)
+    elif over == "best":
+        taken = plural("best of {count} operating point", "best of {count} operating points", count)
     else:
         taken = plural("worst of {count} operating point", "worst of {count} operating points", count)
-    listed = joined("; ", (_point(found, place) for place in range(count))) if count <= _LISTED else NOTHING
+    listed = joined("; ", (_point(found, place) for place in places)) if count <= _LISTED else NOTHING
     return joined(": ", filter(None, (taken, listed)))
 
 
 def _point(found: Designs, place: int) -> Phrase:
-    """An operating point: its parameters with their values."""
+    """An operating point: its name, or its parameters with their values."""
+    if found.plan.names and found.plan.names[place]:
+        return joined("", [found.plan.names[place]])
     values = found.plan.at[place].items()
     return joined(
         ", ",
@@ -142,20 +151,23 @@ def _dimensions(found: Designs, best: int) -> Iterator[KeyNumber]:
 def _limit(found: Designs, best: int, limit: Limit) -> KeyNumber:
     """A limit with the value that is nearest to it at any operating point, and what is left to it."""
     info, values = found.infos[limit.name], found.values[limit.name][best]
+    counted = values[list(limit.at)] if limit.at else values
     case = int(found.front.cases[best, 0])
     cell = info.cell(limit.value)
     if info.kind != "real":
-        met = bool(limit.holds(values).all())
-        own = info.cell(float(values[0]))
+        met = bool(limit.holds(counted).all())
+        own = info.cell(float(counted[0]))
         text = term(str(cell)) if info.kind == "category" else Amount(limit.value, info.unit)
         note = Phrase("as required") if met else Phrase("required: {value}", value=text)
         return KeyNumber(limit.name, str(term(own)) if isinstance(own, str) else own, info.unit, note=note, case=case)
     place = int(worst_places(limit, values[np.newaxis])[0])
-    value, reserve = float(values[place]), reserve_of(found, best, limit)
+    value, reserve = float(worst_of(limit, values[np.newaxis])[0]), reserve_of(found, best, limit)
     assert reserve is not None
     unit, bound = info.unit, _amount(found, limit.name, limit.value)
     note = _reserve(limit, bound, reserve)
     where = Phrase("at {place}", place=_point(found, place)) if len(found.plan.at) > 1 else NOTHING
+    if limit.over:
+        where = _points(found, limit)
     return KeyNumber(limit.name, value, unit, digits(value), where=where, note=note, case=case)
 
 
@@ -275,11 +287,10 @@ def _named(limit: Limit) -> Phrase | Name:
 
 
 def reserve_of(found: Designs, best: int, limit: Limit) -> float | None:
-    """What is left to a limit at its worst operating point, as a share of it; None for a category or a count."""
+    """What is left to a limit where it counts, at the worst operating point, as a share; None for a category or count."""
     if found.infos[limit.name].kind != "real":
         return None
-    values = found.values[limit.name][best]
-    off = float(values[int(worst_places(limit, values[np.newaxis])[0])]) - limit.value
+    off = float(worst_of(limit, found.values[limit.name][best][np.newaxis])[0]) - limit.value
     return {"is": limit.within - abs(off), "at_least": off, "at_most": -off}[limit.kind] / limit.scale
 
 

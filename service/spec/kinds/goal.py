@@ -21,6 +21,7 @@ from sprag_study.service.spec.kinds.fields import (
     read_result,
     read_value,
 )
+from sprag_study.service.spec.kinds.places import AT, NAME, POINT_NAME, Places
 from sprag_study.service.spec.kinds.robust import QUANTILE, check_drives, read_quantile
 from sprag_study.service.spec.lists import refuse_mixed
 from sprag_study.service.spec.schema.quantity import QUANTITY
@@ -36,10 +37,19 @@ if TYPE_CHECKING:
     from sprag_study.worker.models import ResultInfo
 
 _KINDS: Final = ("is", "at_least", "at_most")
+_NAME: Final = r"^[^\W_][\w .+/-]{0,39}$"
 _MAX: Final = Described("max", "", "whether the largest value is the best", "flag", default=False)
 _WITHIN: Final = Described(
     "within", "", "how far from that", "text", default="1 %", limits="a quantity, or a share of the value"
 )
+_OVER_HELP: Final = "what counts of several operating points: the worst one, the mean, or the best one"
+_OVER: Final = choice(
+    "over", f"{_OVER_HELP}; by default as the field `over` of the whole goal says", "worst", "mean", "best"
+)
+_OVER_LIMIT: Final = choice(
+    "over", "whether the mean or the best one of the operating points must keep the limit; by default each must",
+    "mean", "best",
+)  # fmt: skip
 _VARIABLE: Final = Record(
     {
         "path": PATHS,
@@ -56,6 +66,7 @@ _LIMIT: Final = Record(
         "at_least": QUANTITY,
         "at_most": QUANTITY,
         "within": _WITHIN,
+        "at": AT,
     },
     required=("result",),
 )
@@ -64,14 +75,14 @@ _YIELD: Final = Listed(
     item=_LIMIT,
 )  # fmt: skip
 _GOAL: Final = Variants((
-    Record({"result": RESULT, "max": _MAX, "quantile": QUANTILE}, required=("result",)),
+    Record({"result": RESULT, "max": _MAX, "quantile": QUANTILE, "at": AT, "over": _OVER}, required=("result",)),
     # Generators of clients write invalid code for a constant that is true.
     Record({"yield": _YIELD, "max": {"type": "boolean", "description": "true: a yield is to be as large as possible"}},
            required=("yield",)),
 ))  # fmt: skip
 _SHARE: Final = {"type": ["number", "string"], "description": 'a share, as in "90 %"'}
 _CONSTRAINT: Final = Variants((
-    Record({**_LIMIT.fields, "quantile": QUANTILE}, required=("result",)),
+    Record({**_LIMIT.fields, "quantile": QUANTILE, "over": _OVER_LIMIT}, required=("result",)),
     Record({"yield": _YIELD, "at_least": _SHARE}, required=("yield", "at_least")),
 ))  # fmt: skip
 GOAL: Final = Record(
@@ -80,8 +91,12 @@ GOAL: Final = Record(
         "best": Listed("goals", 0, 8, "results that are to be as small, or with max as large, as possible", item=_GOAL),
         "subject_to": Listed("constraints", 0, 32, "what a feasible design must fulfil", item=_CONSTRAINT),
         "at": Listed(
-            "operating points", 0, 64, "parameters of each operating point; by default one, that of the base",
-            item={"type": "object", "minProperties": 1, "additionalProperties": QUANTITY},
+            "operating points", 0, 64,
+            "parameters of each operating point, and its `name` if it has one; by default one, that of the base",
+            item={
+                "type": "object", "minProperties": 1, "properties": {NAME: {"type": "string", "pattern": POINT_NAME}},
+                "additionalProperties": QUANTITY,
+            },
         ),
         "start": Listed(
             "known designs", 0, 1000,
@@ -90,8 +105,7 @@ GOAL: Final = Record(
             item={"type": "object", "additionalProperties": QUANTITY},
         ),
         "over": choice(
-            "over", "what counts of several operating points: the worst one, or the mean", "worst", "mean",
-            default="worst",
+            "over", _OVER_HELP, "worst", "mean", "best", default="worst",
         ),
         "population": Described(
             "population", "Designs of a generation", "designs of one generation", "whole", 4, 1000, 100
@@ -174,9 +188,13 @@ def read_points(goal: Node, variables: Variables | None) -> list[dict[str, float
         if not isinstance(item.value, Mapping) or not item.value:
             item.refuse("wrong-type", "must be an object", allowed='as in {"shaft.load": "0.2 N*m"}')
             continue
+        if set(item.value) == {NAME}:
+            item.refuse("required", "has a name and no parameters", allowed='as in {"name": "idle", "shaft.load": 0}')
         point: dict[str, float] = {}
         for path in item.value:
             place = item[path]
+            if path == NAME:
+                continue
             if path in machine.derive:
                 place.refuse("conflict", "is derived from other parameters", path, allowed="a path of `base`")
             elif path not in machine.parameters:
@@ -198,6 +216,14 @@ def read_points(goal: Node, variables: Variables | None) -> list[dict[str, float
     return points if at.sound else None
 
 
+def _read_over(item: Node, described: Described) -> dict[str, str] | None:
+    """How a goal or a limit counts at several points; empty by default, None, and a fault recorded, if wrong."""
+    if not item[described.name].given:
+        return {}
+    over = described.read(item)
+    return None if over is None else {described.name: over}
+
+
 def _refuse_mixed_points(items: Sequence[Node]) -> None:
     """Record bare numbers that a parameter has at some points beside quantities of another scale at others."""
     for path, entry in items[0].machine.parameters.items() if items else ():
@@ -215,8 +241,9 @@ def read_goal(
     variables, points : as `read_variables` and `read_points` give them
     drives : number of drawn drives; 0 without tolerances
     """
-    best = _read_best(GOAL.items(goal, "best"))
-    read = [_read_constraint(item, robust=True) for item in GOAL.items(goal, "subject_to")]
+    places = Places(goal["at"], GOAL.items(goal, "at"), points)
+    best = _read_best(GOAL.items(goal, "best"), places)
+    read = [_read_constraint(item, places, robust=True) for item in GOAL.items(goal, "subject_to")]
     constraints = [constraint for constraint in read if constraint]
     search = {name: field.read(goal) for name, field in GOAL.described.items() if name != "least_gain"}
     least_gain = goal["least_gain"].otherwise(GOAL.described["least_gain"].default).share(0.0, 1.0)
@@ -239,6 +266,7 @@ def read_goal(
         return None
     plan = {"kind": "goal", "vary": variables, "best": best, "subject_to": constraints, "at": points, **search}
     plan |= ({"drives": drives} if drives else {}) | ({"start": start} if start else {})
+    plan |= {"names": places.names} if any(places.names) else {}
     return plan | (_of_one_goal(search["polish"], least_gain or 0.0) if len(best) == 1 else {})
 
 
@@ -299,53 +327,61 @@ def _read_known(item: Node, variable: Variable) -> float | None:
     return value
 
 
-def _read_best(items: Sequence[Node]) -> list[dict[str, Any]]:
+def _read_best(items: Sequence[Node], places: Places) -> list[dict[str, Any]]:
     best: list[dict[str, Any]] = []
     for item in items:
         if not _GOAL.read(item):
             continue
         if "yield" in item:
-            best += _read_yield_goal(item)
+            best += _read_yield_goal(item, places)
             continue
         info = read_numeric_result(item["result"])
         largest, quantile = _MAX.read(item), read_quantile(item)
-        if info is None or largest is None or quantile is None:
+        at, over = places.read(item), _read_over(item, _OVER)
+        if info is None or largest is None or quantile is None or at is None or over is None:
             continue
-        if any((goal.get("result"), goal.get("quantile")) == (info.name, quantile.get("quantile")) for goal in best):
+        about = {"result": info.name, **quantile, **at, **over}
+        if any({key: value for key, value in goal.items() if key != "max"} == about for goal in best):
             item["result"].refuse("repeated", "is a goal already", info.name, allowed="each result once")
         else:
-            best.append({"result": info.name, **quantile, "max": largest})
+            best.append({**about, "max": largest})
     return best
 
 
-def _read_yield_goal(item: Node) -> list[dict[str, Any]]:
+def _read_yield_goal(item: Node, places: Places) -> list[dict[str, Any]]:
     """The goal of a large yield; nothing, and faults recorded, where it is invalid."""
-    item.refuse_each(("result", "quantile"), "cannot be combined with `yield`")
+    item.refuse_each(("result", "quantile", "at", "over"), "cannot be combined with `yield`")
     if item["max"].otherwise(True).value is not True:
         item["max"].refuse("conflict", "a yield is to be large", allowed="true")
         return []
-    conditions = _read_conditions(item["yield"])
+    conditions = _read_conditions(item["yield"], places)
     return [{"yield": conditions, "max": True}] if conditions else []
 
 
-def _read_conditions(node: Node) -> list[dict[str, Any]]:
+def _read_conditions(node: Node, places: Places) -> list[dict[str, Any]]:
     """The conditions of a yield; nothing, and faults recorded, where one is invalid."""
-    read = [_read_constraint(item) for item in _YIELD.read(node) or ()]
+    read = [_read_constraint(item, places) for item in _YIELD.read(node) or ()]
     return [condition for condition in read if condition] if node.sound else []
 
 
-def _read_constraint(item: Node, *, robust: bool = False) -> dict[str, Any] | None:
+def _read_constraint(item: Node, places: Places, *, robust: bool = False) -> dict[str, Any] | None:
     """One constraint; None, and the faults recorded, where it is invalid. ``robust``: of a quantile or a yield, too."""
     if not (_CONSTRAINT if robust else _LIMIT).read(item):
         return None
     if robust and "yield" in item:
-        item.refuse_each(("result", "quantile", "is", "at_most", "within"), "cannot be combined with `yield`")
-        conditions, least = _read_conditions(item["yield"]), item["at_least"].share(0.0, 1.0)
+        item.refuse_each(
+            ("result", "quantile", "is", "at_most", "within", "at", "over"), "cannot be combined with `yield`"
+        )
+        conditions, least = _read_conditions(item["yield"], places), item["at_least"].share(0.0, 1.0)
         return None if least is None or not conditions else {"yield": conditions, "at_least": least}
     info, kind, quantile = read_result(item["result"]), item.one_of(_KINDS), read_quantile(item)
-    if info is None or kind is None or quantile is None:
+    at, over = places.read(item), _read_over(item, _OVER_LIMIT) if robust else {}
+    if info is None or kind is None or quantile is None or at is None or over is None:
         return None
     limit = item[kind]
+    if over and kind == "is":
+        item["over"].refuse("conflict", "cannot be combined with `is`", allowed="at_least or at_most")
+        return None
     if quantile and kind == "is":
         item["quantile"].refuse("conflict", "cannot be combined with `is`", allowed="at_least or at_most")
         return None
@@ -362,7 +398,7 @@ def _read_constraint(item: Node, *, robust: bool = False) -> dict[str, Any] | No
     within = _read_within(item["within"], info, kind, value)
     if value is None or within is None:
         return None
-    return {"result": info.name, **quantile, kind: value, **({"within": within} if within else {})}
+    return {"result": info.name, **quantile, **at, **over, kind: value, **({"within": within} if within else {})}
 
 
 def _read_within(node: Node, info: ResultInfo, kind: str, value: float | None) -> float | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -89,6 +90,46 @@ def test_the_worst_of_two_points_is_brought_to_where_they_meet() -> None:
             np.array([[one[0], one[1], load]]))["f"][0]} for load in (1.0, 2.0)],
     )  # fmt: skip
     assert values == pytest.approx(solution.fun, rel=1e-6)
+
+
+def _at_loads(points: Floats) -> dict[str, Floats]:
+    """A goal that differs at three loads, and a limit that grows with them."""
+    x, y, load = points.T
+    first, second = (x - 1.0) ** 2 + y**2, 100.0 + (x + 1.0) ** 2 + y
+    return {"f": np.select([load == 1.0, load == 2.0], [first, second], 1e3 - 9.0 * x), "c": load * (x + y)}
+
+
+@pytest.mark.parametrize(
+    "limit",
+    [
+        Limit("c", "at_most", 1.0, at=(1,), where="the second"),
+        Limit("c", "at_most", 1.0, over="mean"),
+        Limit("c", "at_most", 0.5, over="best"),
+        Limit("c", "at_most", 0.75, at=(0, 1), where="both", over="mean"),
+    ],
+)
+def test_goals_and_limits_count_at_points_of_their_own(limit: Limit) -> None:
+    """Least (x - 1)^2 + y^2 where x + y <= 1/2: 1/8."""
+    vary = [Variable(("x",), -3.0, 3.0), Variable(("y",), -2.0, 3.0)]
+    at = tuple({"load": load} for load in (1.0, 2.0, 3.0))
+    plan = plan_of(vary, ["f"], at=at, subject_to=(limit,), generations=8, finish=True)
+    value, design, _ = _best(replace(plan, best=(Goal("f", False, at=(0,), where="the first"),)), _at_loads)
+    assert value == pytest.approx(0.125, rel=1e-6)
+    assert design == pytest.approx([0.75, -0.25], abs=1e-3)
+
+
+def test_the_worst_of_some_points_is_brought_to_where_they_meet() -> None:
+    """Least largest of (x - 1)^2 and (x + 1)^2 + y^2 of three points: 1 at the origin."""
+
+    def function(points: Floats) -> dict[str, Floats]:
+        x, y, load = points.T
+        return {"f": np.select([load == 1.0, load == 2.0], [(x - 1.0) ** 2, (x + 1.0) ** 2 + y**2], 1e3 + x)}
+
+    vary = [Variable(("x",), -3.0, 3.0), Variable(("y",), -2.0, 3.0)]
+    at = tuple({"load": load} for load in (3.0, 1.0, 2.0))
+    plan = plan_of(vary, ["f"], at=at, over="best", generations=8, finish=True)
+    goal = Goal("f", False, at=(1, 2), where="two", over="worst")
+    assert _best(replace(plan, best=(goal,)), function)[0] == pytest.approx(1.0, rel=1e-6)
 
 
 def test_equalities_that_were_met_stay_met_and_the_goal_becomes_best_along_them() -> None:

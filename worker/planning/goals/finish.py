@@ -244,7 +244,7 @@ class _Limits:
         points = len(plan.at)
         rows: list[tuple[int, float, float, float]] = []
         for i, limit in enumerate(plan.subject_to):
-            columns = range(points * i, points * (i + 1))
+            columns = [points * i + place for place in limit.counted(points)]
             if limit.polished:
                 within = (MET if exact else limit.within / limit.scale) - _WITHIN
                 rows += [

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag_study.worker.limits import MAX_DRIVES
+from sprag_study.worker.planning.goals.linear import weighted_sum
 from sprag_study.worker.spread import DRIVE
 
 #: Value of "kind" in the plan.
@@ -21,6 +22,9 @@ GENERATIONS = (1, 10_000)
 MOST_DESIGNS = 1_000_000
 
 Kind = Literal["is", "at_least", "at_most"]
+#: What counts of several operating points.
+Over = Literal["worst", "mean", "best"]
+_OVER: tuple[Over, ...] = ("worst", "mean", "best")
 _KINDS: tuple[Kind, ...] = ("is", "at_least", "at_most")
 
 
@@ -65,6 +69,9 @@ class _Quantity:
     result: str
     quantile: float | None
     conditions: tuple[Limit, ...]
+    at: tuple[int, ...]
+    where: str
+    over: Over | None
 
     @property
     def robust(self) -> bool:
@@ -73,11 +80,18 @@ class _Quantity:
 
     @property
     def name(self) -> str:
-        """Its name: "torque.max", "torque.max (95 % quantile)", "yield (torque.max at most 3)"."""
+        """Its name: "torque.max", "torque.max (95 % quantile, at idle)", "yield (torque.max at most 3)"."""
         if not self.conditions:
-            return self.result + ("" if self.quantile is None else f" ({100.0 * self.quantile:.10g} % quantile)")
+            return self.result + self._about
         words = {"is": "is", "at_least": "at least", "at_most": "at most"}
-        return f"yield ({' and '.join(f'{one.result} {words[one.kind]} {one.value:.6g}' for one in self.conditions)})"
+        held = (f"{one.result}{one._about} {words[one.kind]} {one.value:.6g}" for one in self.conditions)
+        return f"yield ({' and '.join(held)})"
+
+    @property
+    def _about(self) -> str:
+        quantile = [] if self.quantile is None else [f"{100.0 * self.quantile:.10g} % quantile"]
+        parts = [*quantile, *([self.over] if self.over else []), *([f"at {self.where}"] if self.where else [])]
+        return f" ({', '.join(parts)})" if parts else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,12 +107,21 @@ class Goal(_Quantity):
         A quantile of the result over the drawn drives, 0 to 1; by default the result of the nominal drive.
     conditions : tuple of Limit
         The goal is the yield instead: the share of the drawn drives that meet them all at every operating point.
+    at : tuple of int
+        The operating points that count; by default all.
+    where : str
+        What these are called; "" for all.
+    over : {"worst", "mean", "best"}, optional
+        What counts of several points; by default as the plan says.
     """
 
     result: str
     max: bool
     quantile: float | None = None
     conditions: tuple[Limit, ...] = ()
+    at: tuple[int, ...] = ()
+    where: str = ""
+    over: Over | None = None
 
     @property
     def upwards(self) -> bool:
@@ -108,7 +131,7 @@ class Goal(_Quantity):
 
 @dataclass(frozen=True, slots=True)
 class Limit(_Quantity):
-    """What a result must be, at every operating point; SI, or the code of a category.
+    """What a result must be, at every operating point that counts; SI, or the code of a category.
 
     Attributes
     ----------
@@ -118,6 +141,9 @@ class Limit(_Quantity):
     within : float
         Half width of the band around ``value`` of an equality; 0 for a category or a count, which must be equal.
     quantile, conditions : as of `Goal`; neither goes with "is"
+    at, where : as of `Goal`
+    over : {"mean", "best"}, optional
+        The mean or the best one of the points must meet it, instead of each; not with "is".
     """
 
     result: str
@@ -126,6 +152,9 @@ class Limit(_Quantity):
     within: float = 0.0
     quantile: float | None = None
     conditions: tuple[Limit, ...] = ()
+    at: tuple[int, ...] = ()
+    where: str = ""
+    over: Over | None = None
 
     @property
     def upwards(self) -> bool:
@@ -150,6 +179,21 @@ class Limit(_Quantity):
         """What violations of the limit are divided by: its value, or where that is 0 its band or 1."""
         return abs(self.value) or self.within or 1.0
 
+    def judged(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values at operating points, shape (designs, points), with those that do not count at the limit itself.
+
+        Where the mean or the best one counts, it is at the first of the points, in the place of its value.
+        """
+        if not (self.at or self.over):
+            return values
+        judged, counted = np.full_like(values, self.value), self.counted(values.shape[1])
+        judged[:, counted] = taken(self, values, self.over)[:, None] if self.over else values[:, counted]
+        return judged
+
+    def counted(self, points: int) -> list[int]:
+        """The places of ``judged`` that hold what counts, of so many operating points."""
+        return [0] if self.over else list(self.at or range(points))
+
 
 @dataclass(frozen=True)
 class GoalPlan:
@@ -163,8 +207,8 @@ class GoalPlan:
     subject_to : tuple of Limit
     at : tuple of dict of float
         Operating points of each design: the same paths in each, at least one point, which may be empty.
-    over : {"worst", "mean"}
-        How a goal is taken over the operating points. A limit must hold at each of them.
+    over : {"worst", "mean", "best"}
+        How a goal is taken over the operating points, unless it says so itself. A limit must hold at each of them.
     population, generations, seed : int
     polish : bool
         Whether equalities are met to 1e-6 by further rounds after the last generation.
@@ -178,6 +222,8 @@ class GoalPlan:
         generation.
     drives : int
         Drawn drives of each design at each operating point, beside the nominal one; 0 without tolerances.
+    names : tuple of str
+        What the operating points are called, "" for those without a name; () where none has one.
     start : tuple of tuple of float
         Known designs, values of the variables in their order, which the first generation has; at most a population.
 
@@ -191,7 +237,7 @@ class GoalPlan:
     best: tuple[Goal, ...]
     subject_to: tuple[Limit, ...] = ()
     at: tuple[Mapping[str, float], ...] = ({},)
-    over: Literal["worst", "mean"] = "worst"
+    over: Over = "worst"
     population: int = 100
     generations: int = 60
     seed: int = 1
@@ -201,6 +247,7 @@ class GoalPlan:
     finish: bool = False
     growing: bool = False
     least_gain: float = 0.0
+    names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         _check_variables(self)
@@ -211,7 +258,10 @@ class GoalPlan:
             _check(0.0 <= limit.within < math.inf, within, limit.within, "a finite number of at least 0")
         _check_robust(self)
         _check(bool(self.best or self.subject_to), "best", [], "at least one goal, or a limit in subject_to")
-        _check(self.over in {"worst", "mean"}, "over", self.over, "worst or mean")
+        _check(len(self.names) in {0, len(self.at)}, "names", len(self.names), "a name for each operating point")
+        _check(self.over in _OVER, "over", self.over, "worst, mean or best")
+        for i, item in enumerate(self.items):
+            _check_counted(i, item, len(self.at))
         for name, value, (low, high) in (
             ("population", self.population, POPULATION),
             ("generations", self.generations, GENERATIONS),
@@ -275,6 +325,7 @@ class GoalPlan:
                 finish=bool(data.get("finish", False)),
                 growing=bool(data.get("growing", False)),
                 least_gain=float(data.get("least_gain", 0.0)),
+                names=tuple(str(name) for name in data.get("names", ())),
             )
         except KeyError as error:
             raise ValueError(f"goal: {error.args[0]} is missing") from error
@@ -303,7 +354,26 @@ class GoalPlan:
             **({"finish": True} if self.finish else {}),
             **({"growing": True} if self.growing else {}),
             **({"least_gain": self.least_gain} if self.least_gain else {}),
+            **({"names": list(self.names)} if self.names else {}),
         }
+
+
+def taken(item: Goal | Limit, values: NDArray[np.float64], over: Over) -> NDArray[np.float64]:
+    """What counts of values at operating points, shape (designs, points) in, (designs,) out.
+
+    ``over`` is how, unless the goal or limit says so itself: the worst one or the mean, NaN where a value is missing,
+    or the best one of those that are there.
+    """
+    counted = values[:, list(item.at)] if item.at else values
+    over = item.over or over
+    if over == "mean":
+        mean: NDArray[np.float64] = weighted_sum(np.ones(counted.shape[1]), counted.T) / counted.shape[1]
+        return mean
+    if over == "best":
+        best: NDArray[np.float64] = (np.fmax if item.upwards else np.fmin).reduce(counted, axis=1)
+        return best
+    worst: NDArray[np.float64] = counted.min(axis=1) if item.upwards else counted.max(axis=1)
+    return worst
 
 
 def _check(holds: bool, name: str, value: object, allowed: str) -> None:
@@ -322,11 +392,31 @@ def _check_robust(plan: GoalPlan) -> None:
         _check(not (one.robust and isinstance(one, Limit) and one.kind == "is"), name, "is", "at_least or at_most")
 
 
+def _check_counted(i: int, item: Goal | Limit, points: int) -> None:
+    """Check at which operating points a goal or a limit, number ``i`` of all, counts, and how."""
+    for inner in item.conditions:
+        _check_counted(i, inner, points)
+        _check(inner.over is None, f"items.{i}.over", inner.over, "none in a yield")
+    inside = all(0 <= place < points for place in item.at) and len(set(item.at)) == len(item.at)
+    _check(inside, f"items.{i}.at", item.at, f"operating points, each once, 0 to {points - 1}")
+    _check(not (item.conditions and (item.at or item.over)), f"items.{i}.at", item.at, "none of a yield")
+    free = isinstance(item, Goal) or (item.over != "worst" and not (item.over and item.kind == "is"))
+    _check(
+        (item.over is None or item.over in _OVER) and free, f"items.{i}.over", item.over, "mean or best, not with is"
+    )
+
+
 def _about(one: Goal | Limit) -> dict[str, Any]:
     """What a goal or a limit is about, as plain JSON data."""
     if one.conditions:
         return {"yield": [_limit_json(condition) for condition in one.conditions]}
-    return {"result": one.result, **({} if one.quantile is None else {"quantile": one.quantile})}
+    return {"result": one.result, **({} if one.quantile is None else {"quantile": one.quantile}), **_counted(one)}
+
+
+def _counted(one: Goal | Limit) -> dict[str, Any]:
+    """At which operating points it counts, and how, where that is not as usual."""
+    at = {"at": list(one.at), "where": one.where} if one.at else {}
+    return at | ({"over": one.over} if one.over else {})
 
 
 def _limit_json(one: Limit) -> dict[str, Any]:
@@ -373,12 +463,16 @@ def _limit(i: int, data: Mapping[str, Any]) -> Limit:
     kinds = [kind for kind in _KINDS if kind in data]
     _check(len(kinds) == 1, f"subject_to.{i}", sorted(data), "one of is, at_least and at_most")
     within, (result, quantile, conditions) = float(data.get("within", 0.0)), _read_about(data)
-    return Limit(result, kinds[0], float(data[kinds[0]]), within, quantile, conditions)
+    return Limit(result, kinds[0], float(data[kinds[0]]), within, quantile, conditions, *_read_counted(data))
 
 
 def _goal(data: Mapping[str, Any]) -> Goal:
     result, quantile, conditions = _read_about(data)
-    return Goal(result, bool(data["max"]), quantile, conditions)
+    return Goal(result, bool(data["max"]), quantile, conditions, *_read_counted(data))
+
+
+def _read_counted(data: Mapping[str, Any]) -> tuple[tuple[int, ...], str, Over | None]:
+    return tuple(int(place) for place in data.get("at", ())), str(data.get("where", "")), data.get("over")
 
 
 def _read_about(data: Mapping[str, Any]) -> tuple[str, float | None, tuple[Limit, ...]]:

@@ -75,5 +75,5 @@ class Table:
         held: Flags = np.all(self.ok[:, :, 1:], axis=1)
         for condition in conditions:
             values = self._results(condition.result, condition)[:, :, 1:]
-            held = held & np.all(condition.holds(values), axis=1)
+            held = held & np.all(condition.holds(values[:, list(condition.at)] if condition.at else values), axis=1)
         return np.asarray(held, dtype=np.float64)

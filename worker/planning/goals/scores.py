@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag_study.worker.planning.goals.linear import weighted_sum
+from sprag_study.worker.planning.goals.plan import taken
 from sprag_study.worker.planning.goals.robust import Table
 
 if TYPE_CHECKING:
@@ -73,39 +73,34 @@ def joined(first: Scores, second: Scores) -> Scores:
 
 
 def outputs_of(plan: GoalPlan, rows: Rows) -> Floats:
-    """What designs are judged by, shape (designs, limits x points + goals + 1).
+    """What designs are judged by, shape (designs, outputs).
 
-    The columns are what each limit is about at each operating point, with half widths counted against it, the goals
-    taken over the operating points, where a finish needs them (``goals_at``) the goal at each of these, and 1 where a
-    case has failed or had not settled (of drawn drives: all of them), otherwise 0. Values that are missing or not
-    finite are NaN.
+    The columns are what each limit is about at each operating point (the limit itself at those that do not count, as of
+    `Limit.judged`), with half widths counted against it, the goals taken over the operating points, where a finish
+    needs them (``goals_at``) the goal at each of these that counts, and 1 where a case has failed or had not settled
+    (of drawn drives: all of them), otherwise 0. Values that are missing or not finite are NaN.
     """
     table = Table(plan, rows)
-    goals = [_over_points(plan.over, table.values(goal), goal.max) for goal in plan.best]
-    columns = [table.values(limit, limit) for limit in plan.subject_to]
+    goals = [taken(goal, table.values(goal), plan.over) for goal in plan.best]
+    columns = [limit.judged(table.values(limit, limit)) for limit in plan.subject_to]
     columns += [one[:, None] for one in goals]
-    columns += [table.values(goal) for goal in plan.best if _at_points(plan)]
+    columns += [table.values(goal)[:, points] for goal in plan.best if (points := _apart(plan))]
     return np.hstack([*columns, table.failed.astype(np.float64)[:, None]])
 
 
-def _at_points(plan: GoalPlan) -> bool:
-    """Whether outputs have the goal at each operating point, too: a worst one has no derivatives where two meet."""
-    return plan.finish and len(plan.best) == 1 and plan.over == "worst" and len(plan.at) > 1
+def _apart(plan: GoalPlan) -> list[int]:
+    """The operating points whose goals outputs have, too: a worst one has no derivatives where two meet."""
+    if not plan.finish or len(plan.best) != 1 or (plan.best[0].over or plan.over) != "worst":
+        return []
+    points = list(plan.best[0].at or range(len(plan.at)))
+    return points if len(points) > 1 else []
 
 
 def goals_at(plan: GoalPlan, outputs: Floats) -> Floats:
     """The values of which the largest is the goal, to be minimised; of one goal, shape (designs, values)."""
     first = len(plan.at) * len(plan.subject_to)
-    columns = outputs[:, first + 1 : -1] if _at_points(plan) else outputs[:, first:-1]
+    columns = outputs[:, first + 1 : -1] if _apart(plan) else outputs[:, first:-1]
     return np.asarray(columns * signs(plan))
-
-
-def _over_points(over: str, values: Floats, largest: bool) -> Floats:
-    if over == "worst":
-        worst: Floats = values.min(axis=1) if largest else values.max(axis=1)
-        return worst
-    mean: Floats = weighted_sum(np.ones(values.shape[1]), values.T) / values.shape[1]
-    return mean
 
 
 def signs(plan: GoalPlan) -> Floats:

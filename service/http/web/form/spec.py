@@ -183,6 +183,13 @@ def _window(form: Filled) -> dict[str, Any]:
     return {"window": [plain(text) for text in with_last_unit(texts)]} if any(texts) else {}
 
 
+def _counted(item: Mapping[str, Any]) -> Values:
+    """The field of the operating point at which a goal or a limit counts."""
+    if not isinstance(item.get("at", ""), str):
+        raise ValueError("the form has no fields for operating points by their values")
+    return {"at": item.get("at", "")}
+
+
 class _Points:
     """The operating points of a search: a row has a parameter with its values at all of them."""
 
@@ -199,7 +206,16 @@ class _Points:
             if fault := _wrong_column(column, next(iter(columns.values()), column)):
                 form.faults[f"{row.at}/values"] = [fault]
             columns.setdefault(path, column)
-        points = [dict(zip(columns, point, strict=True)) for point in zip(*columns.values(), strict=False)]
+        points: list[dict[str, Any]] = [
+            dict(zip(columns, point, strict=True)) for point in zip(*columns.values(), strict=False)
+        ]
+        names = [name.strip() for name in form.values.get(_NAMES, "").split(";")]
+        for index, name in enumerate(names if any(names) else ()):
+            form.fields[f"{form.pointer}/at/{index}/name"] = _NAMES
+            if index >= len(points):
+                form.faults[_NAMES] = [_("has more names than there are operating points")]
+            elif name:
+                points[index] = {"name": name, **points[index]}
         pointer = f"{form.pointer}/at"
         form.fields[pointer] = _AT.pointer
         for index, row in [(index, row) for index in range(max(len(points), 1)) for row in rows]:
@@ -210,7 +226,9 @@ class _Points:
     def show(self, item: Mapping[str, Any], form: Filled) -> set[str]:
         """As of a `Member`."""
         points = item.get("at", ())
-        paths = list(points[0]) if points else []
+        names = [str(point.get("name", "")) for point in points]
+        form.values[_NAMES] = "; ".join(names) if any(names) else ""
+        paths = [path for path in points[0] if path != "name"] if points else []
         form.values["at"] = str(len(paths))
         for row, path in enumerate(paths):
             values = "; ".join(text_of(point[path]) for point in points)
@@ -344,6 +362,10 @@ _TOWARD: Final = Cell(
     lambda item: {"toward": "max" if item.get("max", False) else "min"}, counts=False,
 )  # fmt: skip
 _LIMIT: Final = Cell((*(kind for kind, _label in LIMITS), "within"), (*["value"] * 3, "within"), _limit, _limit_fields)
+_COUNTED: Final = (
+    Cell(("at",), ("at",), lambda form: {"at": text} if (text := form.text("at")) else {}, _counted, counts=False),
+    chosen("over"),
+)
 _START: Final = Cell(
     ("start",), ("start",), lambda form: {"start": [{}]} if form.text("start") == "on" else {}, _start_fields,
     counts=False,
@@ -362,6 +384,8 @@ _UNTIL: Final = Cell(
     lambda item: {"until": _TIMED if set(TIMED_FIELDS) & set(item) else SETTLED}
     | ({"duration": text_of(item["duration"])} if "duration" in item else {}),
 )  # fmt: skip
+#: Field with the names of the operating points.
+_NAMES: Final = "/goal/names"
 _AT: Final = Rows("at", "/goal/at", MAX_AXES, Record((typed("path"), typed("values"))))
 _ASKED: Final = Rows(
     "quantities", "/quantities", MAX_QUANTITIES, Record((typed("name"), typed("formula"), typed("unit")))
@@ -377,12 +401,12 @@ PARTS: Final = {
             "vary", "/goal/vary", GOAL.listed["vary"].high, Record((_PATHS, _VARIABLE_VALUES), whole="/values"),
         ),
         Rows(
-            "best", "/goal/best", GOAL.listed["best"].high, Record((_RESULT, _TOWARD), whole="/result"),
+            "best", "/goal/best", GOAL.listed["best"].high, Record((_RESULT, _TOWARD, *_COUNTED), whole="/result"),
             new={"toward": "max"}, always=False,
         ),
         Rows(
             "subject_to", "/goal/subject_to", GOAL.listed["subject_to"].high,
-            Record((_RESULT, _LIMIT), whole="/result"), new={"kind": "at_most"}, always=False,
+            Record((_RESULT, _LIMIT, *_COUNTED), whole="/result"), new={"kind": "at_most"}, always=False,
         ),
         _AT,
         _ASKED,

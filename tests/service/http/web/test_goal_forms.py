@@ -56,6 +56,15 @@ def test_a_search_is_cloned_with_all_that_it_asks_for() -> None:
         assert faults == {}
         assert again["goal"] == spec["goal"]
         assert parse_spec(again).study.plan == parse_spec(spec).study.plan
+    named = [{"name": "idle", "shaft.load": "0.1 N*m"}, {"shaft.load": "0.3 N*m"}]
+    best, limit = {"result": "efficiency", "max": True, "over": "best"}, {"result": "torque.max", "at_most": "3 N*m"}
+    spec = searching(at=named, best=[best], subject_to=[{**limit, "at": "idle"}, {**limit, "over": "mean"}])
+    spec["quantities"] = {"cost": "1 + shaft.load / (1 N*m)", "eff": {"formula": "2 * efficiency", "unit": "%"}}
+    again, faults = spec_of(values_of(json.loads(json.dumps(spec))))
+    assert (faults, again["goal"], again["quantities"]) == ({}, spec["goal"], spec["quantities"])
+    assert parse_spec(again).study.plan == parse_spec(spec).study.plan
+    with pytest.raises(ValueError, match="by their values"):
+        values_of(searching(at=named, best=[{**best, "at": {"shaft.load": "0.1 N*m"}}]))
     with pytest.raises(ValueError, match="form"):
         values_of(searching(more=1))
     with pytest.raises(ValueError, match="no fields for known designs"):

@@ -173,7 +173,7 @@ def test_a_known_design_is_one_of_the_search(changes: dict[str, Any], pointer: s
         ({"at": [0.2]}, "/goal/at/0", "wrong-type"),
         ({"population": 3}, "/goal/population", "out-of-range"),
         ({"population": 1000, "generations": 10_000}, "/goal/generations", "too-many"),
-        ({"over": "best"}, "/goal/over", "invalid-choice"),
+        ({"over": "sum"}, "/goal/over", "invalid-choice"),
     ],
 )
 def test_what_is_wrong_is_told_with_its_place(changes: dict[str, Any], pointer: str, code: str) -> None:
