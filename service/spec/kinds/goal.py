@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from sprag_study.worker.models import ResultInfo
 
 _KINDS: Final = ("is", "at_least", "at_most")
-_NAME: Final = r"^[^\W_][\w .+/-]{0,39}$"
 _MAX: Final = Described("max", "", "whether the largest value is the best", "flag", default=False)
 _WITHIN: Final = Described(
     "within", "", "how far from that", "text", default="1 %", limits="a quantity, or a share of the value"
