@@ -287,7 +287,7 @@ def _named(limit: Limit) -> Phrase | Name:
 
 
 def reserve_of(found: Designs, best: int, limit: Limit) -> float | None:
-    """What is left to a limit where it counts, at the worst operating point, as a share; None for a category or count."""
+    """What is left to a limit at the worst of its points, as a share of it; None for a category or a count."""
     if found.infos[limit.name].kind != "real":
         return None
     off = float(worst_of(limit, found.values[limit.name][best][np.newaxis])[0]) - limit.value
