@@ -53,7 +53,9 @@ def test_a_limit_holds_where_it_counts(service: Service, counted: dict[str, Any]
     found, efficiency, failed = judged(service, subject_to=[limit])
     meets = (taken(efficiency) >= 0.62) & ~failed
     assert 0 < np.count_nonzero(meets) < len(meets)
-    assert {one["design"] for one in found["designs"] if one["feasible"]} == set(np.flatnonzero(meets).tolist())
+    listed = {one["design"] for one in found["designs"]}  # all but those that serve derivatives
+    assert len(listed) >= 20 * 4
+    assert {one["design"] for one in found["designs"] if one["feasible"]} == listed & set(np.flatnonzero(meets))
     (told,) = found["subject_to"]
     assert told.get("points") == ([0] if counted.get("at") == "idle" else [1] if "at" in counted else None)
     assert told.get("over") == counted.get("over")
