@@ -151,7 +151,7 @@ def _dimensions(found: Designs, best: int) -> Iterator[KeyNumber]:
 def _limit(found: Designs, best: int, limit: Limit) -> KeyNumber:
     """A limit with the value that is nearest to it at any operating point, and what is left to it."""
     info, values = found.infos[limit.name], found.values[limit.name][best]
-    counted = values[list(limit.at)] if limit.at else values
+    counted = limit.judged(values[np.newaxis])[0, limit.counted(len(values))]
     case = int(found.front.cases[best, 0])
     cell = info.cell(limit.value)
     if info.kind != "real":
