@@ -20,7 +20,7 @@ from tests.conftest import Finished
 
 def test_bad_cases_are_named_and_the_others_ok_until_a_retry_mends_them(tmp_path: Path) -> None:
     few: dict[str, Any] = {"cases": 8, "crashing": 1, "hanging": 1, "periods": 4.0, "chunk": 1, "processes": 1}
-    badcases(tmp_path, **few, seed=1, timeout=1.0, timed=False)
+    badcases(tmp_path, **few, seed=1, timeout=10.0, timed=False)
 
 
 def test_files_that_may_not_grow_hold_the_studies_until_they_may(tmp_path: Path) -> None:
