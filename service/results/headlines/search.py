@@ -245,7 +245,10 @@ def converged(found: Designs, *, over: bool) -> Phrase:
             "The search has not converged: its best design was brought to the optimum beside it, and more generations "
             "may come to another one."
         )
-    return Phrase("The search has not converged: it was still becoming better, and more generations would help.")
+    return Phrase(
+        "The search has not converged: its best value has not stood still long enough, and more generations may better "
+        "it."
+    )
 
 
 def _after(found: Designs, bests: dict[int, float]) -> float:

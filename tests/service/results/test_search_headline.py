@@ -56,7 +56,8 @@ def test_a_search_says_whether_more_generations_would_help() -> None:
     )
     still = _search([3.0, 2.5, 2.0, 1.5])
     assert _said(still) == (
-        "The search has not converged: it was still becoming better, and more generations would help."
+        "The search has not converged: its best value has not stood still long enough, and more generations may better "
+        "it."
     )
     assert _said(still, over=False) == ""
     assert _said(_search([3.0, 2.5, 2.0, 1.5], {"finish": 20, "best": [1.4]})) == (
