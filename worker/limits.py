@@ -11,6 +11,8 @@ MAX_DERIVED: Final = 100
 #: Quantities of one study, and characters of the name of one.
 MAX_QUANTITIES: Final = 50
 MAX_QUANTITY_NAME: Final = 40
+#: Least and most generations of a search.
+GENERATIONS: Final = 1, 10_000
 #: Parameters with tolerances of one study, and its drawn drives.
 MAX_TOLERANCES: Final = 1_000
 MAX_DRIVES: Final = 100_000

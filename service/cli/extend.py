@@ -20,6 +20,7 @@ from sprag_study.service.reading.numbers import assumption, could_be_one, in_lan
 from sprag_study.service.reading.printed import could_be_values
 from sprag_study.service.reading.together import with_last_unit
 from sprag_study.worker.limits import (
+    GENERATIONS,
     MAX_BODY_BYTES,
     MAX_NARROW_STEPS,
     MAX_SETTLED_PERIODS,
@@ -27,7 +28,6 @@ from sprag_study.worker.limits import (
     MIN_SETTLED_PERIODS,
     NARROW_STEPS,
 )
-from sprag_study.worker.planning.goals.plan import GENERATIONS
 
 
 def extend(

@@ -24,8 +24,8 @@ from sprag_study.service.spec.machine.registry import part_of
 from sprag_study.service.spec.node import Node
 from sprag_study.service.spec.report import Report, SpecError
 from sprag_study.worker.directions import SWEEP
-from sprag_study.worker.limits import MAX_AXES
-from sprag_study.worker.planning.goals.plan import GENERATIONS, GOAL
+from sprag_study.worker.limits import GENERATIONS, MAX_AXES
+from sprag_study.worker.planning.goals.plan import GOAL
 from sprag_study.worker.study import without_drives
 
 if TYPE_CHECKING:

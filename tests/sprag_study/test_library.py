@@ -72,6 +72,7 @@ def test_the_example_of_derived_parameters_has_the_numbers_of_the_guide() -> Non
         .read_text(encoding="utf-8")
         .split("\n### Derived parameters\n")[1]
         .split("\n## ")[0]
+        .split("\n### ")[0]
     )
     (fields,) = re.findall(r"```json\n(.*?)```", page, re.DOTALL)
     spec = json.loads((ROOT / "examples" / "one_pendulum.json").read_text(encoding="utf-8"))

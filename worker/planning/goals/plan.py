@@ -10,15 +10,14 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag_study.worker.limits import MAX_DRIVES
+from sprag_study.worker.limits import GENERATIONS, MAX_DRIVES
 from sprag_study.worker.planning.goals.linear import weighted_sum
 from sprag_study.worker.spread import DRIVE
 
 #: Value of "kind" in the plan.
 GOAL: Final = "goal"
-#: Bounds of a plan: designs of one generation, generations, designs in all.
+#: Bounds of a plan: designs of one generation, designs in all.
 POPULATION = (4, 10_000)
-GENERATIONS = (1, 10_000)
 MOST_DESIGNS = 1_000_000
 
 Kind = Literal["is", "at_least", "at_most"]

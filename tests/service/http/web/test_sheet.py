@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 
 DRIVE: Final = {**empty("vibration-drive"), "ticks:axes": "shaft.load excitation.amplitude_x pendulums.0.arm"}
 
-#: Words in sight within the form; a select has that of its choice.
+#: Words in sight within the form, without the motion that answers it later; a select has that of its choice.
 WORDS: Final = r"""() => {
   const walk = (node) => {
     if (node.nodeType === 3) return node.textContent;
     if (node.nodeType !== 1 || !node.checkVisibility()) return " ";
-    if (node.matches("option:not(:checked), .hidden, .skip")) return " ";
+    if (node.matches("option:not(:checked), .hidden, .skip, #live")) return " ";
     const inside = node.matches("details:not([open])") ? [node.querySelector("summary")] : [...node.childNodes];
     return inside.map(walk).join(" ");
   };
