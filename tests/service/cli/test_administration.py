@@ -177,7 +177,7 @@ def test_health_and_metrics_of_a_service(asked: Run, office: Office, monkeypatch
     [
         *(
             (words, "--server: this command works on a database on its host")
-            for words in ("token list", "token create --name x", "db backup FILE", "db check", "db upgrade", "worker")
+            for words in ("db backup FILE", "db check", "db upgrade", "worker")
         ),
         *(
             (f"{words} --db kept.sqlite3", "--db: belongs to this machine, and --server names a service")

@@ -43,6 +43,23 @@ OTHERS = {
     **{f"show {name}": "as `show curves`" for name in ("front", "map", "ribbon", "sensitivity", "sql", "yield")},
     **dict.fromkeys(("compare", "export", "show case", "show cases", "show rounds"), "as `show curves`"),
     **dict.fromkeys(("check", "show state"), "reads which rows can be reused"),
+    **{
+        f"show {name}": "reads the case with which a machine starts"
+        for name in (
+            "basin",
+            "branch",
+            "diagram",
+            "duty",
+            "engagements",
+            "forces",
+            "regimes",
+            "section",
+            "settled",
+            "strobes",
+            "trajectory",
+            "transient",
+        )
+    },
     "serve": "its requests, schedules and nightly work act by themselves",
     "admin worker": "the same without requests; cases are no changes of a person",
     "admin doctor": "reads",

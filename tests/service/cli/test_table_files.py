@@ -11,7 +11,7 @@ import pytest
 
 from sprag_study.service.cli.console import WrongInputError
 from sprag_study.service.cli.files import read_spec
-from sprag_study.service.spec.machine import shaft_parts
+from sprag_study.service.spec.machine import shaft_numbers, shaft_parts
 
 Sprag = Callable[..., Any]
 
@@ -88,8 +88,8 @@ def test_what_stays_beside_a_table_are_fields_of_the_spec() -> None:
 
     beside = {"interpolation", shaft_parts.RECORDED_AT.path}
     assert _KEPT["operation"] == {*shaft_parts.OPERATION_CHOICES, *beside, "scale", "efficiency"}
-    assert _KEPT["indicator"] == {"over", *beside, *shaft_parts.numbers_under("operation.indicator.")}
-    own = shaft_parts.numbers_of({"balance": "motor", "drive": {"motor": "table"}}, "drive.motor.")
+    assert _KEPT["indicator"] == {"over", *beside, *shaft_numbers.numbers_under("operation.indicator.")}
+    own = shaft_numbers.numbers_of({"balance": "motor", "drive": {"motor": "table"}}, "drive.motor.")
     assert _KEPT["motor"] == {"interpolation", *own}
 
 
