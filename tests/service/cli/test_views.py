@@ -123,7 +123,7 @@ def test_a_spec_takes_its_points_without_a_view_too(
     points.write_text("shaft.load [N*mm]\n50\n75\n")
     done = sprag("show", sources[0], "--points", points)
     assert (done.code, "valid, 2 cases" in done.out) == (0, True), done.err
-    assert "least_flywheel: valid, at most 1280 cases" in sprag("check", "least_flywheel").out
+    assert "least_flywheel: valid, at most 1504 cases" in sprag("check", "least_flywheel").out
     done = sprag("show", sources[0], "curves", "--points", points, "--y", "shaft.speed.mean", "--json")
     assert json.loads(done.out)["curves"][0]["x"] == [0.05, 0.075]
     done = sprag("show", sources[1], "--points", points)
@@ -192,7 +192,7 @@ def test_wrong_settings_name_their_options(
         (("compare", two, two, "--at", "shaft.load=9 N*m"), "--at: the axis has no such value"),
         (("compare", two, "one_pendulum", "--at", "shaft.lod=0.1"), "--at: not an axis of this study; did you mean"),
         (("compare", two, two.with_name("missing.json")), "missing.json: no such file"),
-        (("show", "fastest_drive", "case", "--case", 1200), "(got 1200; allowed: 0 .. 1199)"),
+        (("show", "fastest_drive", "case", "--case", 9999), "(got 9999; allowed: 0 .. "),
         (("show", "fastest_drive", "curves", "--x", "nonsense"), "--x"),
         (("show", "fastest_drive", "curves", "--y", "nonsense"), "--y"),
         (("show", "fastest_drive", "front", "--x", "nonsense"), "--x: is not a goal"),
