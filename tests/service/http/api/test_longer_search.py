@@ -44,6 +44,9 @@ def test_a_search_that_ended_by_itself_goes_on_from_there(service: Service) -> N
     study_id = search(service, **ONE, generations=500, least_gain="50 %", polish=False)
     reached = service.store.studies.rounds(study_id)[-1].summary["generation"]
     assert reached < 500
+    service.http.post(f"{API}/studies/{study_id}:cancel")
+    service.store.work.settle(service.store.work.take_over("test"), service.store.studies.get(study_id).number)
+    assert service.store.studies.get(study_id).over
     longer = service.http.post(f"{API}/studies/{study_id}:extend", json={"generations": 40}).json()["id"]
     goal = service.get(f"/studies/{longer}")["spec"]["goal"]
     assert (goal["generations"], goal["least_gain"]) == (reached + 40, 0)

@@ -182,6 +182,8 @@ def sent_to(
         for example in content["examples"].values():
             text = example["value"] if isinstance(example["value"], str) else json.dumps(example["value"])
             kind = {} if media is None else {"Content-Type": media}
+            if path.endswith(":extend") and "generations" in text:
+                address = address.replace(study_id, search(service))
             body = None if media is None else text
             sent = {**headers, **kind}
             if body is not None and "Idempotency-Key" in sent:
