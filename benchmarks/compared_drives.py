@@ -1,4 +1,4 @@
-"""What comparisons of hundreds of random drives with scipy share: they count, and tell each drive that differs."""
+"""Counts of a comparison of random drives with scipy; each drive that differs is printed."""
 
 from __future__ import annotations
 

@@ -66,18 +66,18 @@ def missed(columns: dict[str, Any], batch: SettledBatch, case: int) -> float:
     The point is run on to the end of a period by the engine; from there Newton's method with scipy's strobe map takes
     one step.
     """
-    own = {path: float(value[case]) if isinstance(value, np.ndarray) else value for path, value in columns.items()}
-    row = whole_periods(own, SettledRun(), batch.points[case : case + 1])[0][0]
+    drive = {path: float(value[case]) if isinstance(value, np.ndarray) else value for path, value in columns.items()}
+    row = whole_periods(drive, SettledRun(), batch.points[case : case + 1])[0][0]
     order, winding = int(batch.orders[case]), int(batch.windings[case, 0])
     begin = as_parameters(row)
-    machine = _machine(own | begin)
+    machine = _machine(drive | begin)
     state = _state(machine, machine.start)
     scale = np.full(len(state), max(np.abs(state[1:]).max(), machine.nu))
     scale[0] /= machine.nu
     scale[2:-1] /= machine.nu
 
     def image(point: Floats) -> Floats:
-        again = _machine(own | begin, point)
+        again = _machine(drive | begin, point)
         y = again.start.copy()
         for k in range(order):
             y = again.advance(k * again.period, (k + 1) * again.period, y)

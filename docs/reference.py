@@ -19,6 +19,7 @@ from docs import manual
 from sprag_study.engine.formulas.expressions import MAX_LENGTH
 from sprag_study.engine.vibration_drive.examined import MAX_PERIODS
 from sprag_study.engine.vibration_drive.force_results import force_infos
+from sprag_study.engine.vibration_drive.load_results import load_infos
 from sprag_study.service.cli.app import command_line
 from sprag_study.service.cli.console import ExitCode
 from sprag_study.service.cli.settings import VARIABLES
@@ -29,7 +30,7 @@ from sprag_study.service.settings import table
 from sprag_study.worker import limits as limit
 from sprag_study.worker import models
 from sprag_study.worker.models import machine_shaft
-from sprag_study.worker.models.vibration_drive.loads import is_load
+from sprag_study.worker.models.parameters import general_path
 from sprag_study.worker.states import StudyState
 
 FOLDER = Path(__file__).parent
@@ -170,9 +171,10 @@ TIMED, SETTLED = (
 )
 #: Endings of cases of the drive that come from the engine.
 DRIVE_ENDINGS = {k: v for k, v in models.endings_of(DRIVE).items() if k not in set(models.WorkerEnding)}
+_OF_ONE = {general_path(info.name) for info in load_infos(1)}
 #: Results of studies with forces and duty, those that cases of a given time have not, and those of cases with starts
 #: only.
-LOADS = {info.name for info in models.result_catalogue(DRIVE) if is_load(info.name)}
+LOADS = {info.name for info in models.result_catalogue(DRIVE) if general_path(info.name) in _OF_ONE}
 SETTLED_ONLY = SETTLED - TIMED
 STARTS_ONLY = {info.name for info in models.result_catalogue(DRIVE)} - SETTLED - LOADS
 #: Name of a table, as the page has it in a comment above -> heads of its columns, and its rows.

@@ -127,10 +127,8 @@ class Line(NamedTuple):
 
     def carried(self, at: Vector) -> Place:
         """The point of the guide's link that is at the place ``at``."""
-        base, arm = self.through, at - self.through.at
-        first = base.first + arm.ahead * self.link.turn1
-        second = base.second + arm.ahead * self.link.turn2 - arm * np.square(self.link.turn1)
-        return Place(at, first, second)
+        about = self.link._replace(base=self.through)
+        return about.rigid(at - self.through.at)._replace(at=at)
 
 
 def solved(u: Vector, v: Vector, by_u: Floats, by_v: Floats) -> Vector:

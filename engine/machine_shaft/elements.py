@@ -21,9 +21,6 @@ SHAFT, PIN, FRAME, CRANK = "O", "A", "frame", "crank"
 BRANCHES: Mapping[ElementKind, tuple[Branch, ...]] = {
     "RRR": ("left", "right"), "RRP": ("ahead", "behind"), "RPR": ("ahead", "behind"),
 }  # fmt: skip
-#: Number of outer joints of each kind by their names, and of the links to which guides are fixed.
-_JOINTS: Mapping[ElementKind, int] = {"pivot": 0, "point": 0}
-_GUIDES: Mapping[ElementKind, int] = {"point": 1, "RRP": 1, "RPP": 1, "PRP": 2}
 #: Links of each group, by what follows its name.
 _LINKS: Mapping[ElementKind, tuple[str, ...]] = {
     "RRR": ("first", "second"), "RRP": ("first", "slider"), "RPR": ("second",), "RPP": ("slider",),
@@ -103,16 +100,6 @@ class ElementFault(NamedTuple):
     value: str
     message: Sentence
     allowed: Sentence
-
-
-def joint_count(kind: ElementKind) -> int:
-    """Number of outer joints, or of points through which guides go, that an element of this kind names."""
-    return _JOINTS.get(kind, 2)
-
-
-def guide_count(kind: ElementKind) -> int:
-    """Number of links that an element of this kind names."""
-    return _GUIDES.get(kind, 0)
 
 
 def _names(names: Iterator[str]) -> Sentence:

@@ -92,7 +92,7 @@ class _Loads:
     def at(self, joint: str, force: Vector) -> None:
         """Let a force act at a joint."""
         carrier = self._carriers[joint]
-        if carrier in self.blocks and carrier not in self.links:
+        if carrier in self.blocks:
             self.blocks[carrier] = self.blocks[carrier] + force
         else:
             self.on(carrier, force, self.pose.joints[joint].at)

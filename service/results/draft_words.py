@@ -22,10 +22,10 @@ _MOST_AXES: Final = 4
 _DIGITS: Final = 4
 
 
-def draft_words(study: Study, spec: Mapping[str, Any], preview: Preview, reading: Reading, time: str) -> str:
-    """The sentence, in the units and names of a reader; ``time`` is the estimated one in words."""
+def draft_words(study: Study, spec: Mapping[str, Any], preview: Preview, reading: Reading) -> str:
+    """The sentence, in the units and names of a reader."""
     parts = {"what": _what(study, spec, reading), "cases": _cases(study, preview, reading), "ends": _ends(study)}
-    return gettext("{what}; {cases}{ends}; {time}.").format(**parts, time=time)
+    return gettext("{what}; {cases}{ends}.").format(**parts)
 
 
 def _what(study: Study, spec: Mapping[str, Any], reading: Reading) -> str:

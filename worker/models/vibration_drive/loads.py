@@ -12,7 +12,6 @@ import numpy as np
 
 from sprag_study.engine.vibration_drive.cases import of_cases
 from sprag_study.engine.vibration_drive.load_results import load_infos
-from sprag_study.worker.models.parameters import general_path
 from sprag_study.worker.models.starts import count_of
 from sprag_study.worker.models.vibration_drive.settled import settings_of
 
@@ -80,14 +79,6 @@ def with_loads_of_starts(task: ChunkTask, started: StartedBatch) -> tuple[Floats
     first = settled_loads(task.columns, settings, started.motions(further=False))
     further = settled_loads(of_cases(task.columns, started.further), settings, started.motions(further=True))
     return np.hstack([started.values, first]), np.hstack([started.further_values, further])
-
-
-_NAMES: Final = frozenset(general_path(info.name) for info in load_infos(1))
-
-
-def is_load(name: str) -> bool:
-    """Whether a result of that name is one of forces or duty."""
-    return general_path(name) in _NAMES
 
 
 def lacks_loads(name: str, infos: Iterable[ResultInfo]) -> bool:

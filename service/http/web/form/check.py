@@ -127,9 +127,7 @@ def look_over(
         checked.faults["finish_by"], checked.parsed, checked.preview = [fault], None, None
     if checked.parsed is not None and checked.preview is not None:
         reading = reading_for(checked.parsed.study, checked.parsed.spec, choice or Choice(TYPED))
-        checked.words = draft_words(
-            checked.parsed.study, checked.parsed.spec, checked.preview, reading, _time(checked.preview)
-        )
+        checked.words = draft_words(checked.parsed.study, checked.parsed.spec, checked.preview, reading)
         for text in checked.preview["warnings"]:
             name, told = _placed(text, checked.form)
             if name and told is not None:

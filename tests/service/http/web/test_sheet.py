@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 
 DRIVE: Final = {**empty("vibration-drive"), "ticks:axes": "shaft.load excitation.amplitude_x pendulums.0.arm"}
 
-#: Words in sight within the form, without the motion that answers it later; a select has that of its choice.
+#: Words in sight within the form, its answer included; a select has that of its choice.
 WORDS: Final = r"""() => {
   const walk = (node) => {
     if (node.nodeType === 3) return node.textContent;
     if (node.nodeType !== 1 || !node.checkVisibility()) return " ";
-    if (node.matches("option:not(:checked), .hidden, .skip, #live")) return " ";
+    if (node.matches("option:not(:checked), .hidden, .skip")) return " ";
     const inside = node.matches("details:not([open])") ? [node.querySelector("summary")] : [...node.childNodes];
     return inside.map(walk).join(" ");
   };
@@ -246,6 +246,7 @@ def test_a_drive_of_ones_own_with_three_axes(visitor: Visitor, office: Office) -
     expect(page.locator("#go")).to_contain_text("Run 1 case")
     # A page that came before the service could check and draw is made again, which would interrupt the counting.
     expect(page.locator("#study-form[data-checked]:has(.picture svg)")).to_be_attached()
+    expect(page.locator("#live .live-figure svg").first).to_be_visible()
     assert stops(page) <= 20
     assert page.evaluate(WORDS) <= 300
     for name, text in {"mass": "0.4", "arm": "36", "spring_rate": "11"}.items():
