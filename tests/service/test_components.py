@@ -96,7 +96,15 @@ def test_other_faults(data: dict[str, Any], code: str) -> None:
 def test_every_field_of_a_component_is_one_of_the_form() -> None:
     assert [list(fields_of(kind)) for kind in ("spring", "clutch")] == [
         ["spring_rate", "damping"],
-        ["coefficients", "windup_limit", "backlash"],
+        [
+            "coefficients",
+            "windup_limit",
+            "backlash",
+            "rated_torque",
+            "rated_frequency",
+            "rated_speed",
+            "fatigue_exponent",
+        ],
     ]
 
 

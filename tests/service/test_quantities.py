@@ -186,14 +186,15 @@ PRICES: dict[str, Any] = {
 def test_a_goal_and_its_limits_are_quantities(service: Service) -> None:
     """At the heavier load of 0.3 N*m the margin is that of the speed over 6 rad/s."""
     study_id = search_of(service, {**spec_of(**GOAL), "quantities": PRICES})
-    front = service.get(f"/studies/{study_id}/front", limit=144)
+    front = service.get(f"/studies/{study_id}/front", limit=500)
+    known = [design["design"] for design in front["designs"]]  # all but those that served derivatives
     study = service.store.studies.study(study_id)
     columns = study.columns(range(study.cases))
     price = columns["excitation.frequency"] + 2000.0 * columns["shaft.inertia"]
     speed = 4000.0 * columns["excitation.amplitude_x"]
     failed = (columns["excitation.frequency"] > 35.0) & (columns["shaft.inertia"] < 0.0015)
     meets = ((speed - 5.0 - columns["shaft.load"] / 0.3 >= 1.0) & (speed <= 10.0) & ~failed).reshape(-1, 2).all(axis=1)
-    assert front["counts"]["feasible"] == np.count_nonzero(meets) > 0
+    assert front["counts"]["feasible"] == np.count_nonzero(meets[known]) > 0
     best = front["designs"][0]
     assert best["goals"]["price"] == pytest.approx(price[::2][meets].min()) == pytest.approx(18.0, abs=0.2)
     assert [infos["unit"] for infos in front["subject_to"]] == ["rad/s", "rad/s"]

@@ -29,11 +29,11 @@ CREATORS = {"serve", "run", "admin db upgrade"}
 SILENT = {"check", "show state", "admin doctor"}
 #: Arguments of the commands of `OTHERS`.
 ARGUMENTS = {"admin db backup": "copy.sqlite3", "admin db move": "target.sqlite3", "check": "SPEC"} | {
-    **dict.fromkeys(
-        ("export", "show case", "show cases", "show front", "show ribbon", "show rounds", "show state"), "SPEC"
-    ),
+    **{name: "SPEC" for name in OTHERS if name.startswith("show ") or name == "export"},
     "compare": "SPEC SPEC",
+    **dict.fromkeys(("show branch", "show diagram"), "SPEC --along shaft.load"),
     "show sql": "SPEC select(1)",
+    "show transient": "SPEC --kind coast",
     "show map": "SPEC --x a --y b --z c",
     "show sensitivity": "SPEC --y c",
     "show yield": "SPEC c>0",

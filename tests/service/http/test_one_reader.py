@@ -478,7 +478,7 @@ def test_one_look_serves_all_streams_of_a_study(
         path = f"{API}/studies/{study_id}/events"
         opened = [asyncio.ensure_future(ask(service, path, tokens["one"])) for _ in range(STREAMS)]
         followed = service.app.state.context.looks._followed
-        await until(lambda: [one.streams for one in followed.values()] == [STREAMS])
+        await until(lambda: [one.streams for one in followed.values()] == [STREAMS] and bool(seen))
         assert len(seen) == 1
         await anyio.to_thread.run_sync(service.fill, study_id)
         go_on.set()

@@ -92,7 +92,7 @@ def test_a_run_without_room_for_its_rows_is_trouble_of_the_storage(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     usage = shutil.disk_usage(tmp_path)
-    monkeypatch.setattr(room.shutil, "disk_usage", lambda _: usage._replace(free=1_000_000))
+    monkeypatch.setattr(room.shutil, "disk_usage", lambda _: usage._replace(free=0))  # the new database's log has some
     done = sprag("run", examples / "measured_clutch.json", "-o", "rows.csv", *database)
     assert (done.code, done.out) == (3, "")
     assert "sprag: the study was held: no room: the disk that holds" in done.err
