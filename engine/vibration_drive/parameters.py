@@ -22,6 +22,8 @@ DRAG = frozenset({"bearing_damping", "linear_load", "quadratic_load", "clutch_da
 CURVE = frozenset({"stribeck_load", "stribeck_speed", "cyclic_load", "load_cycles", "load_phase"})
 #: A load that swings with the angle of the shaft, for runs of a given time only.
 CYCLIC = "shaft.cyclic_load"
+#: A load that falls with the speed, and the speed at which it does.
+STRIBECK, STRIBECK_AT = "shaft.stribeck_load", "shaft.stribeck_speed"
 #: What bearings and freewheels may bear, and what their loads need beside the motion, which it does not change.
 RATINGS = frozenset(
     {"rated_torque", "rated_frequency", "rated_speed", "fatigue_exponent"}
@@ -155,7 +157,7 @@ _PARAMETERS = (
         "load torque per square of the speed, as of a fan or a pump",
     ),
     Parameter(
-        "shaft.stribeck_load",
+        STRIBECK,
         "M_s",
         "N*m",
         0.0,
@@ -165,14 +167,14 @@ _PARAMETERS = (
         "load torque at rest beyond the load torque, which falls exponentially with the speed, as of friction",
     ),
     Parameter(
-        "shaft.stribeck_speed",
+        STRIBECK_AT,
         "omega_s",
         "rad/s",
         0.0,
         1e6,
         True,
         1.0,
-        "speed at which the Stribeck load has fallen to 1/e",
+        "speed at which the Stribeck load has fallen to 1/e; required with such a load",
     ),
     Parameter(
         CYCLIC,

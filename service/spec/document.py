@@ -124,7 +124,7 @@ def parse_spec(data: object, told: Sequence[str] = ()) -> ParsedSpec:
         check_derived(report, spec.value["derive"], machine, layout(machine, axes, combine), ranges=bool(draft.kind))
     draft.run = part.read_run(spec["run"], axes, combine)
     steps += [kind.read(draft) for kind in WITH_CASES]
-    part.check(report, machine, axes or (), combine)
+    part.check(draft)
     report.raise_if_any()
     draft.quantities = read_quantities(draft)
     report.raise_if_any()

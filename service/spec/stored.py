@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import json
 import math
 import re
 from collections.abc import Mapping
@@ -16,6 +17,7 @@ from sprag_study.service.reading.together import AMBIGUOUS_UNIT, split_list
 from sprag_study.service.spec.csv_text import has_units
 from sprag_study.service.spec.document import parse_spec
 from sprag_study.service.spec.report import SpecError
+from sprag_study.worker.models.vibration_drive.settled import STRIBECK_LOAD, STRIBECK_SPEED
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -27,6 +29,8 @@ if TYPE_CHECKING:
 _APART: Final = 1e-3
 #: Code of a list whose items could also be several values between blanks.
 _BLANKS: Final = "invalid-text"
+#: Speed at which a Stribeck load fell where none was given.
+_SPEED: Final = "1 rad/s"
 #: Fields with the text of a table.
 _TABLES: Final = frozenset({"points", "csv"})
 
@@ -38,13 +42,24 @@ def accepted(spec: Mapping[str, Any], study: Study | None = None) -> dict[str, A
     thousands as decimal points, so that is what they are: their unit, in the heading of a column where it is a table,
     and a further decimal are written. Blanks in the values of a list separated thousands, and are left out. Beside
     decimal commas such points separate thousands, unless the ``study`` that
-    is stored with the spec shows that they were decimal.
+    is stored with the spec shows that they were decimal. A Stribeck load without its speed had that of the engine.
     """
-    settled = _settled(spec)
+    settled = _settled(_with_speed(spec))
     if study is None or not any(map(has_doubtful_point, _texts(settled))):
         return settled
     earlier = {name: value if name == "name" else _with_decimals(value) for name, value in settled.items()}
     return earlier if _unlike(earlier, study) < _unlike(settled, study) else settled
+
+
+def _with_speed(spec: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A spec with the speed that a Stribeck load had where none was given."""
+    base = spec.get("base")
+    shaft = base.get("shaft") if isinstance(base, Mapping) else None
+    load, speed = (path.rpartition(".")[2] for path in (STRIBECK_LOAD, STRIBECK_SPEED))
+    text = json.dumps(spec, default=str)
+    if not isinstance(base, Mapping) or not isinstance(shaft, Mapping) or load not in text or speed in text:
+        return spec
+    return {**spec, "base": {**base, "shaft": {**shaft, speed: _SPEED}}}
 
 
 def _settled(spec: Mapping[str, Any]) -> dict[str, Any]:

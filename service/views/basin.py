@@ -24,6 +24,7 @@ from sprag_study.service.results.start_states import refuse_impossible
 from sprag_study.service.views.branch import named
 from sprag_study.service.views.case_questions import BASIN, BasinQuestion
 from sprag_study.service.views.case_view import CaseAnswer, CaseView
+from sprag_study.service.views.portrait import require_settled
 from sprag_study.service.views.setting import Offered
 from sprag_study.service.views.shown import Column, Shown, ShownTable
 from sprag_study.worker import models
@@ -187,6 +188,7 @@ class BasinView(CaseView[BasinQuestion, BasinQuery, Basin]):
 
     def choose(self, study: Study, case: int, question: BasinQuestion) -> BasinQuery:
         """The grid of initial values."""
+        require_settled(study, case)
         ends = {"x": (question.x_from, question.x_to), "y": (question.y_from, question.y_to)}
         return basin_query(study, case, question.x, question.y, ends, question.points)
 

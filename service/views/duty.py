@@ -16,6 +16,7 @@ from sprag_study.service.views.amounts import Range, amount_of
 from sprag_study.service.views.case_questions import DUTY, DutyQuestion
 from sprag_study.service.views.case_view import CaseAnswer, CaseView, Said
 from sprag_study.service.views.engagements import Clutched, columns_csv, require_clutches
+from sprag_study.service.views.portrait import require_settled
 from sprag_study.service.views.setting import choices_of
 from sprag_study.service.views.shown import Column, Shown, ShownTable
 from sprag_study.worker import models
@@ -77,6 +78,7 @@ class DutyView(Clutched, CaseView[DutyQuestion, Chosen, Duty]):
     def choose(self, study: Study, case: int, question: DutyQuestion) -> Chosen:
         """The table of a CSV file, and the exponent."""
         require_clutches(study)
+        require_settled(study, case)
         text = question.exponent or ""
         return Chosen(
             choice_of("table", question.table, choices_of(DutyQuestion, "table")),

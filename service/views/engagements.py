@@ -14,6 +14,7 @@ from sprag_study.service.languages import N_, _
 from sprag_study.service.reading.reader import Phrase, joined, plural
 from sprag_study.service.views.case_questions import ENGAGEMENTS, EngagementsQuestion
 from sprag_study.service.views.case_view import CaseAnswer, CaseView, Said
+from sprag_study.service.views.portrait import require_settled
 from sprag_study.service.views.shown import Column, Shown, ShownTable
 from sprag_study.worker import models
 from sprag_study.worker.models import Engagements
@@ -82,6 +83,7 @@ class EngagementsView(Clutched, CaseView[EngagementsQuestion, str, Engagements])
     def choose(self, study: Study, case: int, question: EngagementsQuestion) -> str:
         """The table of a CSV file."""
         require_clutches(study)
+        require_settled(study, case)
         return choice_of("table", question.table, COLUMNS)
 
     def compute(self, study: Study, case: int, chosen: str) -> Engagements:

@@ -17,6 +17,7 @@ from sprag_study.service.results.regimes import without_orbit
 from sprag_study.service.views.amounts import Range, amount_of
 from sprag_study.service.views.case_questions import FORCES, ForcesQuestion
 from sprag_study.service.views.case_view import CaseAnswer, CaseView, Said
+from sprag_study.service.views.portrait import require_settled
 from sprag_study.service.views.setting import Offered, choices_of
 from sprag_study.service.views.shown import Column, Shown, ShownTable
 from sprag_study.service.views.trajectory import timed_values, trajectory_csv
@@ -69,6 +70,7 @@ class ForcesView(CaseView[ForcesQuestion, tuple[Bearing, int, str], Forces]):
         if not self.has(study):
             message = f"A machine of model {study.model} has no vibrating table, so that no forces act on one."
             raise FaultError("not-found", message)
+        require_settled(study, case)
         texts = {name: getattr(question, name) for name in _RANGES}
         given = {name: amount_of(name, text, _RANGES[name]) for name, text in texts.items() if text and text.strip()}
         kind = question.bearing and choice_of("bearing", question.bearing, _EXPONENTS)

@@ -17,6 +17,7 @@ from sprag_study.service.views.shown import Shown
 from sprag_study.service.views.trajectory import timed_values, trajectory_csv
 from sprag_study.worker import models
 from sprag_study.worker.models import Portrait
+from sprag_study.worker.models.common import case_machine
 from sprag_study.worker.models.vibration_drive.settled import CYCLIC_LOAD, swings
 
 if TYPE_CHECKING:
@@ -57,6 +58,15 @@ def require_settling(values: Mapping[str, Any], along: tuple[str, ...] = ()) -> 
         raise parameter_error("along", "conflict", SWINGS, CYCLIC_LOAD)
 
 
+def require_settled(study: Study, case: int) -> None:
+    """Raise FaultError where a study asks for the settled motion of a case and none is looked for.
+
+    Such a case is a drive that an earlier release has drawn.
+    """
+    if models.is_settled(study.run):
+        require_settling(case_machine(study, case))
+
+
 class Strobed:
     """A view of cases whose motion is looked at once in each period: which studies have it."""
 
@@ -80,6 +90,7 @@ class StrobesView(Strobed, CaseView[StrobesQuestion, str, Portrait]):
     def choose(self, study: Study, case: int, question: StrobesQuestion) -> str:
         """The table of a CSV file."""
         require_strobes(study)
+        require_settled(study, case)
         return choice_of("table", question.table, choices_of(StrobesQuestion, "table"))
 
     def compute(self, study: Study, case: int, chosen: str) -> Portrait:

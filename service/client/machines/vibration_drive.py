@@ -87,7 +87,8 @@ class DriveShaft(TypedDict, total=False):
         and <= 1e+06 N*m*s^2/rad^2.
     stribeck_load : Load torque at rest beyond the load torque, which falls exponentially with the speed, as of friction
         (M_s), N*m; >= 0 N*m and <= 1e+09 N*m.
-    stribeck_speed : Speed at which the Stribeck load has fallen to 1/e (omega_s), rad/s; > 0 rad/s and <= 1e+06 rad/s.
+    stribeck_speed : Speed at which the Stribeck load has fallen to 1/e; required with such a load (omega_s), rad/s; > 0
+        rad/s and <= 1e+06 rad/s.
     cyclic_load : Share of the load torque by which it swings with the angle of the shaft, as of a press or a cam; only
         in runs of a given time (kappa); >= 0 and <= 1.
     load_cycles : Cycles of the cyclic load in a turn of the shaft (m); > 0 and <= 1000.

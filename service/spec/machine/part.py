@@ -13,6 +13,7 @@ from sprag_study.service.spec.run import refuse_run
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
+    from sprag_study.service.spec.kinds.draft import Draft
     from sprag_study.service.spec.node import Node
     from sprag_study.service.spec.report import Report
     from sprag_study.worker.models import Parameter
@@ -59,7 +60,7 @@ class SpecPart:
     base, run : their descriptions
     read_run : reads `run` as stored in a study, for a machine with its axes (None where they could not be read) and
         their combination
-    check : checks what depends on both machine and axes
+    check : checks what depends on the machine together with what varies, when all of the spec has been read
     warn : warns of what is allowed but implausible
     choices : the non-numeric fields of a study's machine; also takes the user's spec
     """
@@ -69,7 +70,7 @@ class SpecPart:
     check_base: Callable[[Report, Machine], None] = _nothing
     read_run: Callable[[Node, Axes | None, Combine], dict[str, Any]] = _no_run
     run: Field = _NO_RUN
-    check: Callable[[Report, Machine, Axes, Combine], None] = _nothing
+    check: Callable[[Draft], None] = _nothing
     warn: Callable[[Report, Study], None] = _nothing
     choices: Callable[[Study, Mapping[str, Any]], Iterable[Choice]] = _no_choices
 

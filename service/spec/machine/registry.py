@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 from sprag_study.sentences import Sentence
 from sprag_study.service.languages import N_
+from sprag_study.service.reading.catalogue import range_sentence
 from sprag_study.service.spec.axes.axes import varied_values
 from sprag_study.service.spec.derive import case_table, layout
 from sprag_study.service.spec.described import Record
+from sprag_study.service.spec.fields import base_pointer
 from sprag_study.service.spec.machine.choices import drive_choices, shaft_choices
 from sprag_study.service.spec.machine.clutch import check_laws
 from sprag_study.service.spec.machine.drive import Drive, drive_record, read_drive
@@ -24,12 +26,12 @@ from sprag_study.service.spec.schema.quantity import plain_schema
 from sprag_study.service.spec.warnings import warn_machine_shaft, warn_vibration_drive
 from sprag_study.worker import models
 from sprag_study.worker.derived import distinct_values
-from sprag_study.worker.models.vibration_drive.settled import CYCLIC_LOAD
+from sprag_study.worker.models.vibration_drive.settled import CYCLIC_LOAD, STRIBECK_LOAD, STRIBECK_SPEED
 
 if TYPE_CHECKING:
+    from sprag_study.service.spec.kinds.draft import Draft
     from sprag_study.service.spec.machine.machine import Machine
     from sprag_study.service.spec.node import Node
-    from sprag_study.service.spec.report import Report
     from sprag_study.worker.study import Axis, Combine
 
     Axes = tuple[Axis, ...]
@@ -42,13 +44,17 @@ def _drive_run(run: Node, axes: Axes | None, combine: Combine) -> dict[str, Any]
     else:
         settings = read_run(run, varied_values(path, axes, machine.values))
     if models.is_settled(settings) and (CYCLIC_LOAD in machine.derive or _swings(machine, axes)):
-        message = Sentence(
-            "cannot last until the motion is settled: a load that swings with the angle of the shaft ({path}) does not "
-            "repeat with the vibration",
-            path=CYCLIC_LOAD,
-        )
-        run.refuse("conflict", message, None, allowed=N_("a `duration`, such as 200 periods, or no cyclic load"))
+        _refuse_settling(run)
     return settings
+
+
+def _refuse_settling(run: Node) -> None:
+    message = Sentence(
+        "cannot last until the motion is settled: a load that swings with the angle of the shaft ({path}) does not "
+        "repeat with the vibration",
+        path=CYCLIC_LOAD,
+    )
+    run.refuse("conflict", message, None, allowed=N_("a `duration`, such as 200 periods, or no cyclic load"))
 
 
 def _swings(machine: Machine, axes: Axes | None) -> bool:
@@ -56,8 +62,11 @@ def _swings(machine: Machine, axes: Axes | None) -> bool:
     return bool((varied_values(CYCLIC_LOAD, axes, machine.values) > 0.0).any())
 
 
-def _drive_check(report: Report, machine: Machine, axes: Axes, combine: Combine) -> None:
+def _drive_check(draft: Draft) -> None:
+    report, machine, axes, combine = draft.spec.report, draft.spec.machine, draft.axes or (), draft.combine
     assert isinstance(machine, Drive)
+    _check_drawn(draft)
+    _check_stribeck(draft)
     for k, axis in enumerate(axes):
         states = [path for path in axis.paths if path.endswith(".initial_clutch")]
         if states and (axis.array % 1.0).any():
@@ -75,6 +84,30 @@ def _drive_check(report: Report, machine: Machine, axes: Axes, combine: Combine)
             study = layout(machine, axes, combine)
             paths = [path for path in study.column_paths if path.startswith(clutch.prefix)]
             check_laws(report, [clutch], case_table(study, paths), "zip", "/derive")
+
+
+def _check_drawn(draft: Draft) -> None:
+    """Refuse settled motion where the load of some drawn drive swings with the angle of the shaft."""
+    if draft.spread is None or not models.is_settled(draft.run):
+        return
+    for k, tolerance in enumerate(draft.spread.tolerances):
+        if CYCLIC_LOAD in tolerance.paths and (draft.spread.array[:, k] > 0.0).any():
+            _refuse_settling(draft.spec["run"])
+
+
+def _check_stribeck(draft: Draft) -> None:
+    """Refuse a Stribeck load without the speed at which it falls."""
+    machine, axes = draft.spec.machine, draft.axes or ()
+    given = {*machine.values, *machine.derive, *(path for axis in axes for path in axis.paths)}
+    if draft.axes is None or STRIBECK_LOAD not in given or STRIBECK_SPEED in given:
+        return
+    drawn = draft.spread is not None and any(STRIBECK_LOAD in one.paths for one in draft.spread.tolerances)
+    if drawn or STRIBECK_LOAD in machine.derive or varied_values(STRIBECK_LOAD, axes, machine.values).any():
+        message = Sentence("is required with a Stribeck load ({path}): it has fallen to 1/e there", path=STRIBECK_LOAD)
+        entry = machine.parameters[STRIBECK_SPEED]
+        draft.spec.report.fault(
+            base_pointer(STRIBECK_SPEED), "required", message, allowed=range_sentence(entry), unit=entry.unit
+        )
 
 
 def _shaft_run(run: Node, *_: object) -> dict[str, Any]:

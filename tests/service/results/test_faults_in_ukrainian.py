@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import pytest
@@ -16,13 +17,27 @@ from sprag_study.service.results.explore import ExploreQuery, plan_of
 from sprag_study.service.results.selection import locate_axes, numeric_results, require_axis
 from sprag_study.service.schedules.fields import read_fields
 from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.views.basin import BasinView
 from sprag_study.service.views.branch import range_of
+from sprag_study.service.views.case_questions import (
+    BasinQuestion,
+    DutyQuestion,
+    EngagementsQuestion,
+    ForcesQuestion,
+    StrobesQuestion,
+)
+from sprag_study.service.views.duty import DutyView
+from sprag_study.service.views.engagements import EngagementsView
+from sprag_study.service.views.forces import ForcesView
+from sprag_study.service.views.portrait import StrobesView
 from sprag_study.service.views.sections import section_of
 from sprag_study.worker import models
 from tests.service.spec_sample import SPEC, parsed
 
 STUDY = parse_spec(SPEC).study
 PRESS, NO_PRESS = (parsed({"/base/shaft/cyclic_load": share}).study for share in (0.2, 0.0))
+#: A drive of a settled study that an earlier release has drawn.
+DRAWN = replace(PRESS, run=parsed({"/run": {"until": "settled"}}).study.run)
 INFOS = models.study_results(STUDY)
 NOW = datetime(2026, 1, 1, tzinfo=UTC)
 
@@ -78,6 +93,15 @@ def schedule(**fields: object) -> Callable[[], object]:
         (schedule(trouble_flags=["unsettld"]),
          "is not a flag of the model vibration-drive; did you mean 'unsettled'?",
          "не є позначкою моделі vibration-drive; можливо, мається на увазі 'unsettled'?", ""),
+        *(
+            (lambda view=view, question=question: view.choose(DRAWN, 0, question),
+             "has a load that swings with the angle of the shaft",
+             "має навантаження, що коливається з кутом вала (shaft.cyclic_load)", "")
+            for view, question in (
+                (EngagementsView(), EngagementsQuestion()), (DutyView(), DutyQuestion()),
+                (ForcesView(), ForcesQuestion()), (StrobesView(), StrobesQuestion()), (BasinView(), BasinQuestion()),
+            )
+        ),
     ],
 )  # fmt: skip
 def test_the_sentence_of_a_fault(asked: Callable[[], object], english: str, ukrainian: str, allowed: str) -> None:

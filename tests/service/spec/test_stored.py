@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from sprag_study.engine.vibration_drive.cases import default_of
 from sprag_study.service.spec.document import parse_spec
 from sprag_study.service.spec.report import SpecError
 from sprag_study.service.spec.stored import accepted
@@ -108,3 +109,11 @@ def test_blanks_in_a_list_separated_thousands(values: Any) -> None:
     then = accepted(spec)
     assert parse_spec(then).study.axes[0].array.tolist() == pytest.approx([100.2, 300.4, 0.5])
     assert accepted(then) == then
+
+
+def test_a_stribeck_load_without_its_speed_had_that_of_the_engine() -> None:
+    before = changed({"/axes": [{"path": "shaft.stribeck_load", "values": [0, "0.1 N*m"]}]})
+    with pytest.raises(SpecError, match="/base/shaft/stribeck_speed"):
+        parse_spec(before)
+    study = parse_spec(accepted(before)).study
+    assert study.base["shaft.stribeck_speed"] == default_of("shaft.stribeck_speed")

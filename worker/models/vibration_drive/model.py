@@ -55,6 +55,7 @@ from sprag_study.worker.models.vibration_drive.settled import (
     is_settled,
     mean_periods,
     settings_of,
+    swings,
 )
 from sprag_study.worker.models.vibration_drive.swept import start_of, swept
 from sprag_study.worker.models.vibration_drive.turns import turn_of
@@ -463,8 +464,10 @@ class _Strobes:
     def end_state(self, study: Study, case: int) -> dict[str, float] | None:
         from sprag_study.engine.vibration_drive.start_states import end_state
 
-        settings = settings_of(study.run) if is_settled(study.run) else run_of(study.run)
-        return end_state(case_machine(study, case), settings, start_of(study, case))
+        columns = case_machine(study, case)
+        if not is_settled(study.run):
+            return end_state(columns, run_of(study.run), start_of(study, case))
+        return None if swings(columns) else end_state(columns, settings_of(study.run), start_of(study, case))
 
 
 def _run_starts(task: ChunkTask, number: int) -> ChunkResult:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, cast
 import numpy as np
 
 from sprag_study.engine.run import SettledRun
-from sprag_study.engine.vibration_drive.parameters import CYCLIC
+from sprag_study.engine.vibration_drive.parameters import CYCLIC, STRIBECK, STRIBECK_AT
 from sprag_study.engine.vibration_drive.regimes import Regime
 
 if TYPE_CHECKING:
@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 #: Path of the load that swings with the angle of the shaft. With it no motion is looked for to which a drive settles.
 CYCLIC_LOAD: Final = CYCLIC
+#: Paths of the load that falls with the speed, and of the speed at which it does.
+STRIBECK_LOAD: Final = STRIBECK
+STRIBECK_SPEED: Final = STRIBECK_AT
 #: Value of "until" in `Study.run` for settled runs.
 SETTLED: Final = "settled"
 #: Value of the result "regime" of a motion that never repeats.

@@ -222,14 +222,17 @@ def test_a_torque_that_depends_on_speeds_is_part_of_a_study_only_where_it_is_giv
 
 @pytest.mark.parametrize("name", sorted(CURVE))
 def test_a_load_that_is_no_polynomial_is_part_of_a_study_only_where_it_is_given(name: str) -> None:
-    timed = {"/run": {"duration": "40 periods"}}
+    timed: dict[str, Any] = {"/run": {"duration": "40 periods"}}
+    if name == "stribeck_load":
+        timed["/base/shaft/stribeck_speed"] = 1
     pointer, path = f"/base/shaft/{name}", f"shaft.{name}"
     given = parsed({**timed, pointer: 0.5}).study
     assert given.base.items() - parsed(timed).study.base.items() == {(path, 0.5)}
     on_axis = parsed({**timed, "/axes/2": {"path": path, "values": [0.5, 0.6]}}).study
     assert path not in on_axis.base
     dragged = parsed({**timed, "/base/shaft/linear_load": 1e-3}).study
-    assert shape_of(on_axis) == shape_of(given) not in (shape_of(dragged), shape_of(parsed(timed).study))
+    assert shape_of(on_axis) == shape_of(given) != shape_of(parsed({}).study)
+    assert (shape_of(given) == shape_of(dragged)) == ("/base/shaft/stribeck_speed" in timed)
 
 
 def test_a_cyclic_load_has_no_settled_motion() -> None:
@@ -237,11 +240,39 @@ def test_a_cyclic_load_has_no_settled_motion() -> None:
         {"/base/shaft/cyclic_load": 0.2},
         {"/axes/2": {"path": "shaft.cyclic_load", "values": [0, 0.2]}},
         {"/derive": {"shaft.cyclic_load": "shaft.load/(2 N*m)"}},
+        {"/base/shaft/cyclic_load": 0, "/tolerances": [{"path": "shaft.cyclic_load", "plus_minus": 0.1}], "/drives": 2},
+        {
+            "/axes": ...,
+            "/goal": {
+                "vary": [{"path": "shaft.cyclic_load", "from": 0, "to": 0.2}],
+                "best": [{"result": "efficiency", "max": True}],
+            },
+            "/combine": ...,
+            "/base/shaft/cyclic_load": 0,
+        },
     ):
         message = problems({"/run": {"until": "settled"}, **change})["/run"].message
         assert "shaft.cyclic_load" in message
         parsed({"/run": {"duration": "40 periods"}, **change})
     parsed({"/run": {"until": "settled"}, "/base/shaft/cyclic_load": 0})
+
+
+def test_a_stribeck_load_needs_the_speed_at_which_it_falls() -> None:
+    for change in (
+        {"/base/shaft/stribeck_load": 0.2},
+        {"/axes/2": {"path": "shaft.stribeck_load", "values": [0, 0.2]}},
+        {"/derive": {"shaft.stribeck_load": "shaft.load/2"}},
+        {
+            "/base/shaft/stribeck_load": 0,
+            "/tolerances": [{"path": "shaft.stribeck_load", "values": [0.1]}],
+            "/drives": 1,
+        },
+    ):
+        fault = problems(change)["/base/shaft/stribeck_speed"]
+        assert (fault.code, fault.unit) == ("required", "rad/s")
+        parsed({"/base/shaft/stribeck_speed": 2, **change})
+    parsed({"/base/shaft/stribeck_load": 0})
+    parsed({"/base/shaft/stribeck_load": 0.2, "/axes/2": {"path": "shaft.stribeck_speed", "values": [1, 2]}})
 
 
 def test_units_of_a_load_that_rises_with_the_speed() -> None:
