@@ -82,7 +82,11 @@ def parameters(model: str) -> Iterator[Row]:
 def results(model: str, besides: Container[str] | None = None) -> Iterator[Row]:
     """Every result of a model that all cases have; or those that some cases have ``besides``."""
     for info in models.result_catalogue(model):
-        if info.name not in {*SETTLED_ONLY, *STARTS_ONLY, *LOADS} if besides is None else info.name in besides:
+        if (
+            info.name not in {*SETTLED_ONLY, *STARTS_ONLY, *LOADS, *SHAFT_LOADS}
+            if besides is None
+            else info.name in besides
+        ):
             yield f"`{info.name}`", info.unit, info.description
 
 
@@ -114,6 +118,7 @@ def limits() -> Iterator[Row]:
     yield "rows of measured clutch data", f"{limit.MAX_CLUTCH_ROWS:,}"
     yield "steps of an operation, constants of formulas", f"{machine_shaft.MAX_STEPS}"
     yield "stages of a drive train", f"{machine_shaft.MAX_STAGES}"
+    yield "joints of a machine with loads among its results", f"{machine_shaft.MAX_JOINTS}"
     yield "rows of a table of a machine", f"{machine_shaft.MAX_ROWS:,}"
     yield "characters of a formula", f"{MAX_LENGTH:,}"
     yield "excitation periods of a run", f"{limit.MAX_RUN_PERIODS:,.0f}"
@@ -176,6 +181,10 @@ _OF_ONE = {general_path(info.name) for info in load_infos(1)}
 #: only.
 LOADS = {info.name for info in models.result_catalogue(DRIVE) if general_path(info.name) in _OF_ONE}
 SETTLED_ONLY = SETTLED - TIMED
+#: Results of machine shafts that only studies with loads have.
+SHAFT_LOADS = {info.name for info in models.result_catalogue(models.MACHINE_SHAFT)} - {
+    info.name for info in models.result_infos(models.MACHINE_SHAFT, "")
+}
 STARTS_ONLY = {info.name for info in models.result_catalogue(DRIVE)} - SETTLED - LOADS
 #: Name of a table, as the page has it in a comment above -> heads of its columns, and its rows.
 TABLES: dict[str, tuple[str, Iterable[Row]]] = {
@@ -188,6 +197,7 @@ TABLES: dict[str, tuple[str, Iterable[Row]]] = {
     "results of settled cases": ("result | unit | meaning ", results(DRIVE, SETTLED_ONLY)),
     "results of cases with starts": ("result | unit | meaning ", results(DRIVE, STARTS_ONLY)),
     "results of cases with forces and duty": ("result | unit | meaning ", results(DRIVE, LOADS)),
+    "results of machine shafts with loads": ("result | unit | meaning ", results(models.MACHINE_SHAFT, SHAFT_LOADS)),
     "forces of a case": ("result | unit | meaning ", forces()),
     "regimes": ("regime | meaning ", meanings(models.REGIME_SENTENCES)),
     "endings": ("ending | ", meanings(dict(models.ENDING_SENTENCES))),

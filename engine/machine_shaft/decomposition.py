@@ -119,8 +119,8 @@ def characteristics(d: Decomposition, phi_c: int | None) -> dict[str, Floats]:
     with np.errstate(invalid="ignore", divide="ignore"):
         speed = d.square_extremes
         out["omega.max"], out["omega.min"] = np.sqrt(speed.highest), np.sqrt(np.maximum(speed.lowest, 0.0))
-        out["omega.angle_at_max"] = _wrapped(speed.at_highest.angle, d.cycle)
-        out["omega.angle_at_min"] = _wrapped(speed.at_lowest.angle, d.cycle)
+        out["omega.angle_at_max"] = wrapped(speed.at_highest.angle, d.cycle)
+        out["omega.angle_at_min"] = wrapped(speed.at_lowest.angle, d.cycle)
         omega = np.sqrt(d.squares)
         out["omega.midrange"] = 0.5 * (out["omega.max"] + out["omega.min"])
         out["omega.mean_angle"] = panels.integral(omega) / d.cycle
@@ -135,8 +135,8 @@ def characteristics(d: Decomposition, phi_c: int | None) -> dict[str, Floats]:
         out["drive_torque.mean"] = d.drive.ends[:, -1] / d.cycle
         out["energy.mean"], out["energy.min"], out["energy.max"] = d.mean_energy, d.least_energy, d.largest_energy
         out["energy.fluctuation"] = d.work_extremes.highest - d.work_extremes.lowest
-        out["energy.angle_at_max"] = _wrapped(d.work_extremes.at_highest.angle, d.cycle)
-        out["energy.angle_at_min"] = _wrapped(d.work_extremes.at_lowest.angle, d.cycle)
+        out["energy.angle_at_max"] = wrapped(d.work_extremes.at_highest.angle, d.cycle)
+        out["energy.angle_at_min"] = wrapped(d.work_extremes.at_lowest.angle, d.cycle)
         _squares(d, phi_c, out)
         out |= shares(out)
         out["energy.coefficient"] = energy_coefficient(out["energy.fluctuation"], d.drive.ends[:, -1], d.most_work)
@@ -144,7 +144,7 @@ def characteristics(d: Decomposition, phi_c: int | None) -> dict[str, Floats]:
     return out
 
 
-def _wrapped(angle: Floats, cycle: float) -> Floats:
+def wrapped(angle: Floats, cycle: float) -> Floats:
     """Angle in 0 .. cycle, the end of the cycle being 0."""
     turned = np.mod(angle, cycle)
     return np.where(cycle - turned <= 1e-9 * cycle, 0.0, turned)
@@ -152,7 +152,7 @@ def _wrapped(angle: Floats, cycle: float) -> Floats:
 
 def _squares(d: Decomposition, phi_c: int | None, out: dict[str, Floats]) -> None:
     points, out["phi_c.count"] = d.reference(phi_c)
-    out["phi_c"] = _wrapped(points.angle, d.cycle)
+    out["phi_c"] = wrapped(points.angle, d.cycle)
     inverse = 1.0 / d.fields.inertia
     extremes: Extremes = d.panels.extremes(inverse)
     out["inertia.max"], out["inertia.min"] = 1.0 / extremes.lowest, 1.0 / extremes.highest

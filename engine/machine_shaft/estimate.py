@@ -17,11 +17,13 @@ _PART = 0.2
 _GROUP = 7.0
 #: Additional time of a formula that follows the speed, which is then iterated.
 _SPEED = 12.0
+#: Time with loads over that without.
+_LOADS = 1.4
 _SHARP = frozenset({"exp", "tanh", "sinh", "cosh", "atan"})
 
 
-def estimate_seconds(model: MachineSpec) -> float:
-    """Rough time of one case on one core, in s."""
+def estimate_seconds(model: MachineSpec, *, with_loads: bool = False) -> float:
+    """Rough time of one case on one core, in s; ``with_loads`` with the loads among its results."""
     every = [part for _, part in model.every_part()]
     parts = [model.drive, *(own for part in every for own in (part.mechanism, part.operation))]
     panels = PANELS * model.cycle + sum(len(part.table.rows) for part in parts if part.table is not None)
@@ -32,6 +34,8 @@ def estimate_seconds(model: MachineSpec) -> float:
     factor += _PART * (len(every) - 1)
     elements = (each for part in every if part.mechanism.linkage for each in part.mechanism.linkage.elements)
     factor += _GROUP * sum(each.kind not in {"pivot", "point"} for each in elements)
+    if with_loads:
+        factor *= _LOADS
     return 1e-5 + factor * 7e-6 * panels
 
 

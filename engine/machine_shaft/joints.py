@@ -49,16 +49,20 @@ class Reactions(NamedTuple):
         return columns | {f"{name}.moment": along(moment) for name, moment in self.moments.items()}
 
 
-def reaction_columns(choice: LinkageChoice) -> tuple[tuple[str, str], ...]:
-    """Name and SI unit of the columns that the joints of a linkage have in a table over the angle."""
-    names, moments = [PIN], list[str]()
+def joint_names(choice: LinkageChoice) -> tuple[str, ...]:
+    """The joints of a linkage in the order of ``Reactions.forces``."""
+    names = [PIN]
     for each in choice.elements:
         if each.kind not in {"pivot", "point"}:
             ends = ("from", "to") if each.kind == "PRP" else ("inner", "from", "to")
             names += [f"{each.name}.{end}" for end in ends]
-        if each.kind in {"RRP", "RPP"}:
-            moments.append(f"{each.name}.to")
-    forces = ((f"{name}.{part}", "N") for name in names for part in ("force", "x", "y"))
+    return tuple(names)
+
+
+def reaction_columns(choice: LinkageChoice) -> tuple[tuple[str, str], ...]:
+    """Name and SI unit of the columns that the joints of a linkage have in a table over the angle."""
+    moments = [f"{each.name}.to" for each in choice.elements if each.kind in {"RRP", "RPP"}]
+    forces = ((f"{name}.{part}", "N") for name in joint_names(choice) for part in ("force", "x", "y"))
     return (*forces, *((f"{name}.moment", "N*m") for name in moments))
 
 
@@ -139,7 +143,8 @@ def reactions(
         for index, each in reversed(tuple(enumerate(choice.elements))):
             _balance(each, numbers_of_element(values, index), loads, found)
     crank = loads.links[CRANK]
-    forces = {PIN: crank.force * -1.0, **dict(reversed(found.forces.items()))}
+    known = {PIN: crank.force * -1.0, **found.forces}
+    forces = {name: known[name] for name in joint_names(choice)}
     return Reactions(forces, found.moments, np.asarray(-crank.moment))
 
 

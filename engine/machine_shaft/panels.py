@@ -49,6 +49,7 @@ _SAMPLED, _TO_SERIES, _TO_SLOPE = (
     np.ascontiguousarray(m.T) for m in (np.concatenate([_SLOPES, _ENDS]), COEFFICIENTS, _DERIVATIVE)
 )
 TAIL = COEFFICIENTS[-2:].copy()
+_SLOPES_AT_NODES = np.ascontiguousarray(_SLOPES[1:-1])
 _TOTAL = WEIGHTS[None, :].copy()
 
 
@@ -174,6 +175,11 @@ class Panels:
         ends = np.zeros((own.ends.shape[0], own.ends.shape[1] + 1))
         np.cumsum(own.ends, axis=1, out=ends[:, 1:])
         return ends[:, :-1, None] + own.nodes, ends
+
+    def slope(self, values: Floats) -> Floats:
+        """Derivative by the angle at the nodes, of the polynomial of each panel; 0 in panels of zero length."""
+        half = np.where(self.half > 0.0, self.half, np.inf)[..., None]
+        return np.asarray(apply(_SLOPES_AT_NODES, values) / half)
 
     def periodic(self, slope: Floats, source: Floats) -> tuple[Floats, Floats]:
         """Periodic solution of ``T' = slope T + source``: T at the nodes and, shape (cases,), at the angle 0."""

@@ -275,7 +275,7 @@ class ShaftPart:
         return PartFields(inertia, slope, torque + self._carried(own, motion), torque)
 
     def joint_forces(
-        self, phi: Floats, squares: Floats, acceleration: Floats, omega: Floats | None, factor: float
+        self, phi: Floats, squares: Floats, acceleration: Floats, omega: Floats | None, factor: float | Floats
     ) -> JointForces:
         """Forces in the joints of a slider-crank at angles of the shaft, with a ``factor`` on its operation.
 
@@ -284,18 +284,36 @@ class ShaftPart:
         """
         own, motion = self.own_angle(phi), self.motion(phi)
         assert motion is not None
-        push = factor * self._operation.push(own, motion.way_slope, omega)
+        push = self.push(phi, motion.way_slope, omega, factor)
         rods = self._gravity if self.choice.mechanism.weights == "all" else 0.0 * self._gravity
         return joint_forces(self.values, own, squares, acceleration, push, self._gravity, rods)
 
+    def push(self, phi: Floats, way_slope: Floats, omega: Floats | None, factor: float | Floats) -> Floats:
+        """Force of the operation on the working part along its forward stroke in N; parameters as of ``joint_forces``.
+
+        ``way_slope`` is that of ``motion``.
+        """
+        return factor * self._operation.push(self.own_angle(phi), way_slope, omega)
+
+    @property
+    def works(self) -> bool:
+        """Whether its mechanism has a working part: a linkage may have none."""
+        linkage = self.choice.mechanism.linkage
+        return self.mechanism is not None and (linkage is None or bool(linkage.working))
+
+    @property
+    def stroke(self) -> Stroke | None:
+        """The strokes of its mechanism; None for one without dimensions."""
+        return self._stroke
+
     def reactions(
-        self, phi: Floats, squares: Floats, acceleration: Floats, omega: Floats | None, factor: float
+        self, phi: Floats, squares: Floats, acceleration: Floats, omega: Floats | None, factor: float | Floats
     ) -> Reactions:
         """Forces in the joints of a planar linkage; the parameters are those of ``joint_forces``."""
         own, motion = self.own_angle(phi), self.motion(phi)
         assert motion is not None
         assert isinstance(self.mechanism, PlanarLinkage)
-        push = factor * self._operation.push(own, motion.way_slope, omega)
+        push = self.push(phi, motion.way_slope, omega, factor)
         return reactions(self.mechanism, self.values, own, squares, acceleration, push, self._gravity)
 
     def _inertia(self, own: Floats, motion: Motion | None) -> tuple[Floats, Floats]:

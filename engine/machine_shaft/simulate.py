@@ -15,6 +15,8 @@ from sprag_study.engine.machine_shaft.decomposition import Decomposition, charac
 from sprag_study.engine.machine_shaft.drive_train import Train
 from sprag_study.engine.machine_shaft.flywheel import flywheel_results, required_inertia
 from sprag_study.engine.machine_shaft.kinks import motion_kinks
+from sprag_study.engine.machine_shaft.load_results import joints_of, load_infos
+from sprag_study.engine.machine_shaft.loads import Moving, loads, operation_factor
 from sprag_study.engine.machine_shaft.machine import Fields, Machine, check_structure
 from sprag_study.engine.machine_shaft.motor import characteristic, limit_cycle
 from sprag_study.engine.machine_shaft.panels import Panels
@@ -327,8 +329,8 @@ def _required(spec: MachineSpec, columns: Columns, d: Decomposition, endings: Co
     return required
 
 
-def _block(spec: MachineSpec, columns: Columns) -> tuple[Floats, Codes]:
-    """Results and endings of a block of cases: finer panels for those that need them."""
+def _block(spec: MachineSpec, columns: Columns, further: Floats | None) -> tuple[Floats, Codes]:
+    """Results and endings of a block of cases: finer panels for those that need them; writes ``further`` loads."""
     values = np.full((columns.cases, len(_NAMES)), np.nan)
     endings = np.full(columns.cases, _CODE[Ending.CANNOT_ASSEMBLE])
     angle = Machine(spec, columns).unassembled()
@@ -343,11 +345,15 @@ def _block(spec: MachineSpec, columns: Columns) -> tuple[Floats, Codes]:
         values[np.ix_(rows[solved.rough_pace.any(axis=1)], _OF_TIME)] = np.nan
         endings[rows] = solved.endings
         values[rows[lost]] = np.nan
+        if further is not None:
+            machine = Machine(spec, columns.take(rows))
+            factor = operation_factor(machine, solved.results["balance.factor"])
+            further[rows] = loads(Moving(machine, solved.decomposition, solved.omega, factor), solved.endings)
     values[~np.isfinite(values)] = np.nan
     return values, endings
 
 
-def simulate(model: MachineSpec, columns: Mapping[str, ArrayLike], *, cases: int) -> Batch:
+def simulate(model: MachineSpec, columns: Mapping[str, ArrayLike], *, cases: int, with_loads: bool = False) -> Batch:
     """Run a batch of cases.
 
     The bits of a case's results do not depend on its batch or order.
@@ -361,6 +367,8 @@ def simulate(model: MachineSpec, columns: Mapping[str, ArrayLike], *, cases: int
         catalogue's default.
     cases : int
         Number of cases, at least 0.
+    with_loads : bool
+        Whether the results of ``load_infos`` follow those of ``result_infos``.
 
     Returns
     -------
@@ -377,9 +385,12 @@ def simulate(model: MachineSpec, columns: Mapping[str, ArrayLike], *, cases: int
     block = Columns.of(model, columns, cases)
     values = np.empty((cases, len(_NAMES)))
     endings = np.empty(cases, dtype=np.int8)
+    count = len(load_infos(len(model.every_part()), len(joints_of(model)))) if with_loads else 0
+    further = np.full((cases, count), np.nan)
     for first in range(0, cases, BLOCK):
         part = slice(first, min(first + BLOCK, cases))
         # Unbounded formulas and torques overflow to infinity, which the endings and empty results report.
         with np.errstate(all="ignore"):
-            values[part], endings[part] = _block(model, block.take(part))
-    return Batch(values, endings)
+            own = further[part] if with_loads else None
+            values[part], endings[part] = _block(model, block.take(part), own)
+    return Batch(np.hstack([values, further]) if with_loads else values, endings)

@@ -9,6 +9,7 @@ from sprag_study.engine.endings import ENDINGS, Ending
 from sprag_study.engine.machine_shaft.columns import Columns
 from sprag_study.engine.machine_shaft.decomposition import Decomposition
 from sprag_study.engine.machine_shaft.joints import reaction_columns
+from sprag_study.engine.machine_shaft.loads import operation_factor
 from sprag_study.engine.machine_shaft.machine import Machine, check_structure
 from sprag_study.engine.machine_shaft.panels import Points
 from sprag_study.engine.machine_shaft.simulate import Solved, attempts, settle
@@ -158,19 +159,13 @@ def _table(d: Decomposition, chosen: int | None, angles: Floats) -> dict[str, Fl
     }
 
 
-def _factor(machine: Machine, solved: Solved) -> float:
-    """Factor of the balance on the operations, 0 where a constant load is in their place."""
-    if machine.spec.balance_side != "operation":
-        return 1.0
-    return float(np.nan_to_num(solved.results["balance.factor"][0], nan=0.0))
-
-
 def _joint_table(machine: Machine, solved: Solved, angles: Floats) -> dict[str, Floats]:
     """Forces in the joints of slider-cranks and linkages."""
     d = solved.decomposition
     table: dict[str, Floats] = {}
     points, cases = d.panels.locate(0, angles), np.zeros(len(angles), dtype=np.int64)
-    factor, acceleration = _factor(machine, solved), d.acceleration()
+    acceleration = d.acceleration()
+    factor = float(operation_factor(machine, solved.results["balance.factor"])[0])
 
     def along(values: Floats) -> Floats:
         shaped = np.ascontiguousarray(np.broadcast_to(values, d.panels.angles.shape))
@@ -198,7 +193,8 @@ def _joint_table(machine: Machine, solved: Solved, angles: Floats) -> dict[str, 
 def _part_table(machine: Machine, solved: Solved, angles: Floats) -> dict[str, Floats]:
     """Travel, inertia and torque of each part; a constant load in place of the operations belongs to none."""
     panels, cases = solved.decomposition.panels, np.zeros(len(angles), dtype=np.int64)
-    points, factor = panels.locate(0, angles), _factor(machine, solved)
+    points = panels.locate(0, angles)
+    factor = float(operation_factor(machine, solved.results["balance.factor"])[0])
     table = {}
     for part in machine.parts:
         fields, motion = part.fields(panels.angles, solved.omega), part.motion(panels.angles)

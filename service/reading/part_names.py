@@ -6,6 +6,8 @@ from typing import Final
 
 from sprag_study.service.languages import N_, _, gettext
 from sprag_study.service.reading.wording import words
+from sprag_study.worker import models
+from sprag_study.worker.models.common import LOADS
 from sprag_study.worker.models.vocabulary import ordinal
 
 #: What parts of a machine are called that have a number.
@@ -26,6 +28,8 @@ RUN_LABELS: Final = {
     "max_period": N_("Largest order"), "duration": N_("Duration"), "tolerance": N_("Tolerance"),
     "reset": N_("Windup counts"), "loads": N_("Forces and duty"),
 }  # fmt: skip
+#: The label of `loads` of a model with other ones.
+LOADS_OF_SHAFTS: Final = N_("Loads")
 
 
 def part_name(path: str) -> str:
@@ -43,8 +47,10 @@ def part_name(path: str) -> str:
     return ", ".join([said[0], *map(lower_first, said[1:])])
 
 
-def run_name(name: str) -> str:
-    """What a setting of the run is called: ``Largest order``."""
+def run_name(model: str, name: str) -> str:
+    """What a setting of the run of a model is called: ``Largest order``."""
+    if (model, name) == (models.MACHINE_SHAFT, LOADS):
+        return _(LOADS_OF_SHAFTS)
     if name == "window":
         return _("evaluated window")
     return _(RUN_LABELS[name] if name in RUN_LABELS else words(name))

@@ -188,12 +188,14 @@ class Reading:
     names: str = CAPTIONS
     #: The numbered parts of which the machine has only one, which are not named.
     single: frozenset[str] = frozenset()
+    #: The names of the joints whose forces are results, in the order of their numbers.
+    joints: tuple[str, ...] = ()
 
     def caption(self, name: str) -> str:
         """What a path, a result or a variable is called; of tied paths ("a = b") each."""
         if self.names == CODES:
             return name
-        first, *tied = (caption(self.model, part, gettext, self.single) for part in name.split(" = "))
+        first, *tied = (caption(self.model, part, gettext, self.single, self.joints) for part in name.split(" = "))
         return " = ".join([first, *map(lower_first, tied)])
 
     def within(self, name: str) -> str:
@@ -221,7 +223,7 @@ class Reading:
         if not section:
             return gettext("Machine") if place.pointer else gettext("Spec")
         if section == "run" and place.pointer.startswith("/run/"):
-            return f"{gettext('Run')}, {lower_first(run_name(name.partition('.')[0]))}"
+            return f"{gettext('Run')}, {lower_first(run_name(self.model, name.partition('.')[0]))}"
         return self.caption(path) if has_caption(self.model, path) else part_name(path)
 
     def say_name(self, name: str) -> str:
@@ -293,7 +295,10 @@ CLUTCH: Final = Reading("vibration-drive")
 
 def reading_for(study: Study, spec: Mapping[str, Any], choice: Choice) -> Reading:
     """The reading of a choice; raises SelectionError for units that cannot be shown."""
-    return Reading(study.model, units_for(study, spec, choice.units), choice.names, single_parts(study.base))
+    model = model_of(study.model)
+    numbered = [*study.base, *(info.name for info in model.results(model.variant_of(study)))]
+    units = units_for(study, spec, choice.units)
+    return Reading(study.model, units, choice.names, single_parts(numbered), model.joints(study))
 
 
 # Sentences that earlier releases stored in English only: what they say is found in them again, for one release.

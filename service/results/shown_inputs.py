@@ -104,7 +104,7 @@ def run_settings(study: Study, spec: Mapping[str, Any], reading: Reading) -> lis
         value = str(item.value)
         known = {} if entry is None else dict(entry.choices)
         text = _(known[value]) if value in known else _run_value(study, item, reading)
-        found.append((run_name(item.path), text, item))
+        found.append((run_name(study.model, item.path), text, item))
     return found
 
 

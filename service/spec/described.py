@@ -8,7 +8,7 @@ from typing import Any, Final, Literal, Union
 
 from sprag_study.sentences import Sentence
 from sprag_study.service.reading.numbers import WITHOUT_DOUBT, assumption, question, settle
-from sprag_study.service.reading.part_names import RUN_LABELS
+from sprag_study.service.reading.part_names import LOADS_OF_SHAFTS, RUN_LABELS
 from sprag_study.service.spec.lists import refuse_mixed
 from sprag_study.service.spec.node import Node
 from sprag_study.service.spec.schema.quantity import Schema, object_schema, one_of, quantity_schema
@@ -322,6 +322,10 @@ _LOADS: Final = (
     "whether the results have the forces on table and bearing and the duty of the clutches, with margins to their "
     "ratings, too; each case takes longer"
 )
+_LOADS_OF_SHAFTS: Final = (
+    "whether the results have stroke, speed, acceleration and force of the working parts and the forces in the joints, "
+    "too; each case takes longer"
+)
 _BACKLASH: Final = "whether the angles include the backlash, which is then subtracted"
 
 #: Fields of a run until it is settled.
@@ -340,6 +344,8 @@ ANY_RUN: Final = named(
     Described("reset", RUN_LABELS["reset"], _RESET, "choice", default="contact", choices=_READINGS),
     Described("loads", RUN_LABELS["loads"], _LOADS, "flag", default=False),
 )
+#: Fields of the run of a machine shaft.
+SHAFT_RUN: Final = named(Described("loads", LOADS_OF_SHAFTS, _LOADS_OF_SHAFTS, "flag", default=False))
 #: Options of the fit of measured clutch data, besides the accuracy.
 FIT: Final = named(
     Described("max_degree", "Highest degree", "highest degree that is tried", "whole", 1, MAX_COEFFICIENTS - 1, 7),

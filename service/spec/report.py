@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from sprag_study.sentences import Place, Sentence, WarningText, plural
@@ -37,6 +37,8 @@ class Report:
         #: What further parts of the spec refer to, as soon as they are known: the machine, the results of its study.
         self.machine: Machine | None = None
         self.results: Sequence[ResultInfo] = ()
+        #: Names of the results that the study would have if its run had `loads`.
+        self.further: Collection[str] = ()
 
     def fault(
         self,

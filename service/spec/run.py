@@ -20,7 +20,7 @@ from sprag_study.service.spec.described import ANY_RUN, DURATION, SETTLED_RUN, R
 from sprag_study.service.spec.lists import refuse_mixed
 from sprag_study.worker.limits import MAX_RUN_PERIODS
 from sprag_study.worker.models import MEANS_FROM_PERIODS
-from sprag_study.worker.models.vibration_drive.loads import LOADS
+from sprag_study.worker.models.common import LOADS
 
 if TYPE_CHECKING:
     import numpy as np

@@ -244,13 +244,13 @@ KEY_COLUMNS = ("study", "case_number", "ending", "flags")
 
 def results_name(model: str, variant: str) -> str:
     """Name of the table with the results of that variant of ``model``."""
-    return "_".join(filter(None, (model, variant))).replace("-", "_")
+    return "_".join(filter(None, (model, models.table_of(model, variant)))).replace("-", "_")
 
 
 @cache
 def results_table(model: str, variant: str) -> sa.Table:
     """The table with the results of that variant of ``model``: a row for each finished case."""
-    name, infos = results_name(model, variant), models.result_infos(model, variant)
+    name, infos = results_name(model, variant), models.result_infos(model, models.table_of(model, variant))
     # Cases are counted and selected by their categories.
     categories = [info.column for info in infos if info.kind == "category"]
     indexes = (sa.Index(f"ix_{name}_{column}", "study", column, "case_number") for column in categories)

@@ -163,6 +163,7 @@ __all__ = [
     "extent",
     "fit_clutch",
     "flags_of",
+    "further_results",
     "half_width",
     "has_clutches",
     "has_strobes",
@@ -199,6 +200,7 @@ __all__ = [
     "shape_of",
     "source_hash",
     "study_results",
+    "table_of",
     "unregister",
     "unsettled",
     "usable",
@@ -279,6 +281,16 @@ def variants(model: str) -> tuple[str, ...]:
 def variant_of(study: Study) -> str:
     """The variant of ``study``."""
     return model_of(study.model).variant_of(study)
+
+
+def table_of(model: str, variant: str) -> str:
+    """The variant of ``model`` whose table has the rows of this one."""
+    return model_of(model).table_of(variant)
+
+
+def further_results(study: Study) -> tuple[ResultInfo, ...]:
+    """The results that ``study`` would have, besides its own, if its run had `loads`."""
+    return model_of(study.model).further_results(study)
 
 
 def result_infos(model: str, variant: str) -> tuple[ResultInfo, ...]:

@@ -13,7 +13,7 @@ from sprag_study.worker.directions import SWEEP
 from sprag_study.worker.spread import DRIVE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
 
@@ -79,6 +79,15 @@ class ChunkResult:
     def count(self) -> int:
         """Number of cases."""
         return len(self.endings)
+
+
+#: Name of the field in `Study.run` that asks for loads as results.
+LOADS: Final = "loads"
+
+
+def has_loads(run: Mapping[str, Any]) -> bool:
+    """Whether the results of a run have the loads of its machines."""
+    return bool(run.get(LOADS, False))
 
 
 def chunk_result(first: int, codes: NDArray[np.int8], flags: list[str], values: NDArray[np.float64]) -> ChunkResult:

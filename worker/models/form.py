@@ -175,6 +175,7 @@ class Form:
     new : values of an empty form
     called : the model in a sentence, such as "a machine shaft"; "" for its title
     with_run : whether its studies have a run, so that cases can start from their neighbours
+    with_loads : whether their run says only whether the cases have loads among their results
     examples : what fields of the study show while they are empty
     drawer : what the drawer with the other fields is about
     front : patterns of the paths, with N for numbers, whose fields are always in sight; none: all of them
@@ -190,6 +191,7 @@ class Form:
     new: Mapping[str, str] = field(default_factory=dict)
     called: str = ""
     with_run: bool = False
+    with_loads: bool = False
     examples: Mapping[str, str] = field(default_factory=dict)
     drawer: str = "More: rare numbers, cases, deadline"
     front: tuple[str, ...] = ()

@@ -148,12 +148,24 @@ class Model(Protocol):
         return {}
 
     def variants(self) -> tuple[str, ...]:
-        """Every variant; studies of one variant have the same results and share a table."""
+        """Every variant with a table of results; studies of one variant have the same results and share a table."""
         return ("",)
 
     def variant_of(self, study: Study) -> str:
         """The variant of a study: at most 40 lower-case letters, digits and hyphens."""
         return ""
+
+    def table_of(self, variant: str) -> str:
+        """The variant of `variants` whose table has the rows of this one: its results are among that one's."""
+        return variant
+
+    def further_results(self, study: Study) -> tuple[ResultInfo, ...]:
+        """The results that the study would have, besides its own, if its run had `loads`."""
+        return ()
+
+    def joints(self, study: Study) -> tuple[str, ...]:
+        """Names of the joints of its machine whose forces are results, in the order of their numbers."""
+        return ()
 
     def results(self, variant: str) -> tuple[ResultInfo, ...]:
         """Every result of a variant, in the order of the columns of `ChunkResult.values`."""

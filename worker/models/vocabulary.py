@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import lru_cache
 from typing import Final
 
@@ -16,7 +16,7 @@ _HALF_WIDTH: Final = ".half_width"
 #: Caption of the half width of a mean.
 HALF_WIDTH: Final = "{caption}, half width"
 #: What a numbered part is called, by the first words of its paths.
-_PARTS: Final = (("pendulums", "pendulum"), ("parts", "part"), ("drive.stages", "stage"))
+_PARTS: Final = (("pendulums", "pendulum"), ("parts", "part"), ("drive.stages", "stage"), ("joints", "joint"))
 #: What designs of a search have beside their goals and limits.
 _OF_DESIGNS: Final = ("rank", "violation", "miss")
 #: Where the short form of a description ends.
@@ -35,20 +35,35 @@ def words(name: str) -> str:
     return text[:1].upper() + text[1:] if text[:1].isascii() else text
 
 
-def caption(model: str, name: str, translate: Callable[[str], str] = str, single: Collection[str] = ()) -> str:
+def caption(
+    model: str, name: str, translate: Callable[[str], str] = str, single: Collection[str] = (),
+    joints: Sequence[str] = (),
+) -> str:  # fmt: skip
     """The caption of a path of a spec, a result or a variable of ``model``: ``Spring rate, pendulum 1``.
 
     Without one of its own, a parameter has the beginning of its description, anything else its name in words.
     ``translate`` gives each text of `caption_texts` in another language. ``single`` are the numbered parts of which
     the machine has only one (`single_parts`): they stand only where something of no part is called the same.
+    ``joints`` are the names of its joints in the order of their numbers.
     """
     if name.endswith(_HALF_WIDTH):
-        return translate(HALF_WIDTH).format(caption=caption(model, name.removesuffix(_HALF_WIDTH), translate, single))
+        return translate(HALF_WIDTH).format(
+            caption=caption(model, name.removesuffix(_HALF_WIDTH), translate, single, joints)
+        )
     text, index, part = _caption(model, name)
     if part and part[1] == "0" and part[0] in single and text not in _without_part(model):
         part = None
-    whose = f", {translate(part[0])} {ordinal(part[1])}" if part else ""
+    whose = f", {translate(part[0])} {_called(part, translate, joints)}" if part else ""
     return translate(text).format(index, number=ordinal(index)) + whose
+
+
+def _called(part: tuple[str, str], translate: Callable[[str], str], joints: Sequence[str]) -> str:
+    """The number of a part, or the name of a joint: ``B.inner``, of part 2 ``B.inner, part 2``."""
+    if part[0] != "joint" or not part[1].isdigit() or int(part[1]) >= len(joints):
+        return ordinal(part[1])
+    name = joints[int(part[1])]
+    own, owner = _within_part(name)
+    return f"{own}, {translate(owner[0])} {ordinal(owner[1])}" if owner else name
 
 
 def bare_caption(model: str, name: str, translate: Callable[[str], str] = str) -> str:

@@ -513,6 +513,16 @@ class ShaftPart(TypedDict, total=False):
     operation: ShaftOperation
 
 
+class ShaftRun(TypedDict, total=False):
+    """Which results the cases have; a machine shaft is solved for its whole cycle at once.
+
+    loads : Whether the results have stroke, speed, acceleration and force of the working parts and the forces in the
+        joints, too; each case takes longer.
+    """
+
+    loads: bool
+
+
 class Shaft(Studies):
     """A study of the model machine-shaft, to be varied and run."""
 
@@ -805,7 +815,7 @@ class Shaft(Studies):
         friction_torque: Quantity | None = None,
         gravity: Quantity | None = None,
         name: str | None = None,
-        run: Mapping[str, Any] | None = None,
+        run: ShaftRun | None = None,
         derive: Mapping[str, Any] | None = None,
     ) -> None:
         """A study of the model 'machine-shaft': the machine that every case begins from.
@@ -848,7 +858,7 @@ class Shaft(Studies):
         name : str, optional
             Name of the study.
         run : values, optional
-            Nothing: a machine shaft is solved for its whole cycle.
+            Which results the cases have; a machine shaft is solved for its whole cycle at once; fields loads.
         derive : values, optional
             Parameters that follow from others in every case, by path: formulas of other parameters, of numbers with
             their units and of functions; `*` stands for every pendulum or step.

@@ -12,7 +12,6 @@ from sprag_study.service.reading.texts import quantity_text
 from sprag_study.service.reading.units import example, parse_quantity
 from sprag_study.service.spec.axes.axes import read_paths
 from sprag_study.service.spec.lists import refuse_mixed
-from sprag_study.worker.models.vibration_drive.loads import lacks_loads
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -59,7 +58,7 @@ def read_result(node: Node) -> ResultInfo | None:
         node.mistake("must be the name of a result", allowed=allowed)
         return None
     info = result_of(infos, node.value)
-    if info is None and lacks_loads(node.value, infos):
+    if info is None and node.value in node.report.further:
         node.refuse("unknown-name", "is a result where `run` has `loads`", allowed=N_('"loads": true in `run`'))
     elif info is None:
         node.refuse("unknown-name", unknown_result(infos, node.value), allowed=allowed)

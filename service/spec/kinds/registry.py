@@ -50,10 +50,12 @@ def _read_cases(draft: Draft) -> Finish | None:
 
     def first_round() -> None:
         """Let the study choose the cases of its first round."""
-        results = models.study_results(replace(draft, axes=(), spread=None).study())
+        study = replace(draft, axes=(), spread=None).study()
+        results = models.study_results(study)
         known = {info.name for info in results}
         told = [models.ResultInfo(name, "1", "") for name in spec.report.told if kind == "goal" and name not in known]
         spec.report.results = (*results, *told)
+        spec.report.further = {info.name for info in models.further_results(study)}
         make_plan()
         spec.report.raise_if_any()
         assert draft.plan is not None

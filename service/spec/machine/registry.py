@@ -5,15 +5,16 @@ A model that is not registered is described by its catalogue of parameters: plai
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from sprag_study.sentences import Sentence
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.catalogue import range_sentence
 from sprag_study.service.spec.axes.axes import varied_values
 from sprag_study.service.spec.derive import case_table, layout
-from sprag_study.service.spec.described import Record
+from sprag_study.service.spec.described import SHAFT_RUN, Record
 from sprag_study.service.spec.fields import base_pointer
 from sprag_study.service.spec.machine.choices import drive_choices, shaft_choices
 from sprag_study.service.spec.machine.clutch import check_laws
@@ -26,6 +27,8 @@ from sprag_study.service.spec.schema.quantity import plain_schema
 from sprag_study.service.spec.warnings import warn_machine_shaft, warn_vibration_drive
 from sprag_study.worker import models
 from sprag_study.worker.derived import distinct_values
+from sprag_study.worker.models import machine_shaft
+from sprag_study.worker.models.common import LOADS
 from sprag_study.worker.models.vibration_drive.settled import CYCLIC_LOAD, STRIBECK_LOAD, STRIBECK_SPEED
 
 if TYPE_CHECKING:
@@ -110,8 +113,33 @@ def _check_stribeck(draft: Draft) -> None:
         )
 
 
+_SHAFT_RUN: Final = Record(
+    SHAFT_RUN, "which results the cases have; a machine shaft is solved for its whole cycle at once"
+)
+
+
 def _shaft_run(run: Node, *_: object) -> dict[str, Any]:
-    return refuse_run(run, N_("belongs to the vibration drive: a machine shaft is solved for its whole cycle at once"))
+    if run.given and not isinstance(run.value, Mapping):
+        return refuse_run(run)
+    node = run[LOADS]
+    for field in run.parts():
+        if field.pointer != node.pointer:
+            field.refuse(
+                "not-used",
+                "belongs to the vibration drive: a machine shaft is solved for its whole cycle at once",
+                allowed=N_("`loads` only"),
+            )
+    if not SHAFT_RUN[LOADS].read(run):
+        return {}
+    structure = run.machine.structure
+    joints = 0 if structure is None else len(machine_shaft.joints_in(structure))
+    if joints > machine_shaft.MAX_JOINTS:
+        message = Sentence(
+            "are results of machines with {most} joints at most, and this one has {count}",
+            most=machine_shaft.MAX_JOINTS, count=joints,
+        )  # fmt: skip
+        node.refuse("out-of-range", message, allowed=N_("no `loads`, or fewer joints"))
+    return {LOADS: True}
 
 
 _PARTS = {
@@ -129,7 +157,7 @@ _PARTS = {
         base=lambda: SHAFT,
         check_base=check_shaft,
         read_run=_shaft_run,
-        run=Record({}, "nothing: a machine shaft is solved for its whole cycle"),
+        run=_SHAFT_RUN,
         warn=warn_machine_shaft,
         choices=shaft_choices,
     ),

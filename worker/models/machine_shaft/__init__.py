@@ -10,6 +10,7 @@ from sprag_study.engine.machine_shaft.elements import (
     LinkageChoice,
     element_faults,
 )
+from sprag_study.engine.machine_shaft.load_results import MAX_JOINTS
 from sprag_study.engine.machine_shaft.problems import RelationError
 from sprag_study.engine.machine_shaft.sketch import Sketch
 from sprag_study.engine.machine_shaft.spec import LINKED, MAX_CONSTANTS, MAX_PARTS, MAX_STAGES, MAX_STEPS, REVOLUTIONS
@@ -24,6 +25,7 @@ from sprag_study.worker.models.machine_shaft.model import (
     base_results,
     check,
     check_structure,
+    joints_in,
     parameters_of,
     reachable_pressure,
     sketches_of,
@@ -37,6 +39,7 @@ __all__ = [
     "LINKED",
     "MAX_CONSTANTS",
     "MAX_ELEMENTS",
+    "MAX_JOINTS",
     "MAX_PARTS",
     "MAX_ROWS",
     "MAX_STAGES",
@@ -57,6 +60,7 @@ __all__ = [
     "check",
     "check_structure",
     "element_faults",
+    "joints_in",
     "parameters_of",
     "reachable_pressure",
     "sketches_of",

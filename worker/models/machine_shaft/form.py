@@ -203,6 +203,7 @@ FORM: Final = Form(
     ),
     new={"/base/mechanism": "slider_crank", "/base/operation": "steps", "/refine/results": "irregularity"},
     called="a machine shaft",
+    with_loads=True,
     front=(
         "mean_speed", "wanted_irregularity", "drive", r"drive\.(inertia|torque(\.\w+)?|flywheel)",
         r"drive\.motor\.(?!inertia).*", r"drive\.flywheel\.(mass|diameter)",

@@ -8,12 +8,13 @@ from dataclasses import replace
 from functools import cache
 from itertools import product
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, cast, get_args
+from typing import TYPE_CHECKING, Any, Final, cast, get_args
 
 import numpy as np
 
 from sprag_study.engine import Ending
 from sprag_study.engine.machine_shaft.elements import ELEMENT_KINDS, Element, LinkageChoice
+from sprag_study.engine.machine_shaft.load_results import every_load_info, joints_of, load_infos
 from sprag_study.engine.machine_shaft.parameters import parameters as _engine_parameters
 from sprag_study.engine.machine_shaft.results import result_infos
 from sprag_study.engine.machine_shaft.spec import (
@@ -27,7 +28,15 @@ from sprag_study.engine.machine_shaft.spec import (
     PartChoice,
     Stage,
 )
-from sprag_study.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape, case_machine, chunk_result
+from sprag_study.worker.models.common import (
+    ChunkResult,
+    ChunkTask,
+    Extent,
+    KernelShape,
+    case_machine,
+    chunk_result,
+    has_loads,
+)
 from sprag_study.worker.models.machine_shaft.presentation import PRESENTATION, presentation_of
 from sprag_study.worker.models.model import Model
 
@@ -165,8 +174,40 @@ def sketches_of(
     return sketches(spec_of(structure), values, angles)
 
 
+def joints_in(structure: Mapping[str, Any] | None) -> tuple[str, ...]:
+    """The joints of a machine whose forces are results of studies with `loads`, in the order of their numbers."""
+    return joints_of(spec_of(structure))
+
+
+#: Variant of the studies with loads of machines with the most parts and joints; that of others begins with it.
+_LOADS_VARIANT: Final = "loads"
+
+
+def _variant(parts: int, joints: int) -> str:
+    return f"{_LOADS_VARIANT}-{parts}-{joints}"
+
+
+def _loaded(study: Study) -> tuple[int, int]:
+    """Numbers of the parts and joints of a machine."""
+    spec = spec_of(study.structure)
+    return len(spec.every_part()), len(joints_of(spec))
+
+
+@cache
+def _results(variant: str) -> tuple[ResultInfo, ...]:
+    if not variant:
+        return result_infos()
+    if variant == _LOADS_VARIANT:
+        return (*result_infos(), *every_load_info())
+    _, parts, joints = variant.split("-")
+    return (*result_infos(), *load_infos(int(parts), int(joints)))
+
+
 class MachineShaft(Model):
-    """A shaft that a drive turns steadily against a mechanism and its resistance, over one cycle."""
+    """A shaft that a drive turns steadily against a mechanism and its resistance, over one cycle.
+
+    Studies with loads have a variant for each number of parts and joints; all of them share one table.
+    """
 
     name = MODEL
     endings = frozenset(
@@ -205,8 +246,28 @@ class MachineShaft(Model):
     def parameters_of(self, study: Study) -> dict[str, Parameter]:
         return {} if study.structure is None else parameters_of(study.structure)
 
+    def variants(self) -> tuple[str, ...]:
+        return ("", _LOADS_VARIANT)
+
+    def variant_of(self, study: Study) -> str:
+        return _variant(*_loaded(study)) if has_loads(study.run) else ""
+
+    def table_of(self, variant: str) -> str:
+        return _LOADS_VARIANT if variant else ""
+
     def results(self, variant: str) -> tuple[ResultInfo, ...]:
-        return result_infos()
+        return _results(variant)
+
+    def further_results(self, study: Study) -> tuple[ResultInfo, ...]:
+        return () if has_loads(study.run) else load_infos(*_loaded(study))
+
+    def joints(self, study: Study) -> tuple[str, ...]:
+        return joints_in(study.structure) if has_loads(study.run) else ()
+
+    def result_catalogue(self) -> tuple[ResultInfo, ...]:
+        infos = load_infos(1, 1)
+        named = ((info, info.name.replace("parts.0.", "parts.N.").replace("joints.0.", "joints.K.")) for info in infos)
+        return (*result_infos(), *(replace(info, name=name) for info, name in named))
 
     def shape_of(self, study: Study) -> KernelShape:
         return SHAPE
@@ -214,7 +275,8 @@ class MachineShaft(Model):
     def run(self, task: ChunkTask) -> ChunkResult:
         from sprag_study.engine.machine_shaft.simulate import simulate
 
-        batch = simulate(spec_of(task.structure), task.columns, cases=task.count)
+        own = has_loads(task.run)
+        batch = simulate(spec_of(task.structure), task.columns, cases=task.count, with_loads=own)
         return chunk_result(task.first, batch.endings, [""] * task.count, batch.values)
 
     def extent(self, study: Study, case: int) -> Extent:
@@ -236,7 +298,7 @@ class MachineShaft(Model):
     def estimate_seconds_per_case(self, study: Study) -> float:
         from sprag_study.engine.machine_shaft.estimate import estimate_seconds
 
-        return estimate_seconds(spec_of(study.structure))
+        return estimate_seconds(spec_of(study.structure), with_loads=has_loads(study.run))
 
     def estimate_compile_seconds(self, shape: KernelShape) -> float:
         """On one core, with the enclosures of formulas."""

@@ -6,21 +6,20 @@ The run of such a study has ``"loads": true``.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sprag_study.engine.vibration_drive.cases import of_cases
-from sprag_study.engine.vibration_drive.load_results import load_infos
+from sprag_study.worker.models.common import has_loads
 from sprag_study.worker.models.starts import count_of
 from sprag_study.worker.models.vibration_drive.settled import settings_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
-    from sprag_study.engine.catalogue import ResultInfo
     from sprag_study.engine.outcome import Batch
     from sprag_study.engine.run import Run
     from sprag_study.engine.vibration_drive.settle import SettledBatch
@@ -29,16 +28,9 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-#: Name of the field in `Study.run`.
-LOADS: Final = "loads"
 #: Seconds that they take for each pendulum: in a case, and besides for each period that they examine of a timed run
 #: (benchmarks/loads.py).
 _SECONDS_EACH, _SECONDS_OF_PERIOD = 0.016, 0.003
-
-
-def has_loads(run: Mapping[str, Any]) -> bool:
-    """Whether the results of a run have forces and duty."""
-    return bool(run.get(LOADS, False))
 
 
 def loads_seconds(run: Mapping[str, Any], pendulums: int, periods: float) -> float:
@@ -79,10 +71,3 @@ def with_loads_of_starts(task: ChunkTask, started: StartedBatch) -> tuple[Floats
     first = settled_loads(task.columns, settings, started.motions(further=False))
     further = settled_loads(of_cases(task.columns, started.further), settings, started.motions(further=True))
     return np.hstack([started.values, first]), np.hstack([started.further_values, further])
-
-
-def lacks_loads(name: str, infos: Iterable[ResultInfo]) -> bool:
-    """Whether a study with the results ``infos`` would have one of that name if its run had forces and duty."""
-    known = {info.name for info in infos}
-    pendulums = len({own.split(".")[1] for own in known if own.startswith("pendulums.")})
-    return pendulums > 0 and name not in known and name in {info.name for info in load_infos(pendulums)}

@@ -33,12 +33,12 @@ from sprag_study.worker.models.common import (
     KernelShape,
     case_machine,
     chunk_result,
+    has_loads,
 )
 from sprag_study.worker.models.model import Model
 from sprag_study.worker.models.starts import count_of, further_starts, has_starts
 from sprag_study.worker.models.vibration_drive.branches import branch_of, branch_results
 from sprag_study.worker.models.vibration_drive.loads import (
-    has_loads,
     loads_seconds,
     with_loads,
     with_loads_of_starts,
@@ -280,6 +280,9 @@ class VibrationDrive(Model):
 
     def results(self, variant: str) -> tuple[ResultInfo, ...]:
         return _results(variant)
+
+    def further_results(self, study: Study) -> tuple[ResultInfo, ...]:
+        return () if has_loads(study.run) else load_infos(pendulums(study))
 
     def numbered_by(self, variant: str) -> str | None:
         return NUMBER if variant.removesuffix(_LOADS_VARIANT).endswith(_STARTS_VARIANT) else None

@@ -16,11 +16,12 @@ from sprag_study.service.reading.reader import Reading
 from sprag_study.service.reading.units import examples
 from sprag_study.service.reading.wording import number, words
 from sprag_study.service.spec.axes.sample import SAMPLE
-from sprag_study.service.spec.described import ANY_RUN, DURATION, SETTLED_RUN, Described
+from sprag_study.service.spec.described import ANY_RUN, DURATION, SETTLED_RUN, SHAFT_RUN, Described
 from sprag_study.service.spec.fields import base_pointer
 from sprag_study.service.spec.kinds import goal, refine
 from sprag_study.worker import models
 from sprag_study.worker.models import Parameter
+from sprag_study.worker.models.form import Form
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -69,9 +70,9 @@ def _default_text(value: float | None) -> str:
     return number(value, 8) if math.isfinite(value) else _("none")
 
 
-def run_fields() -> dict[str, Field]:
-    """The fields of the run that take one text each, by name."""
-    entries = [*SETTLED_RUN.values(), DURATION, *ANY_RUN.values()]
+def run_fields(form: Form) -> dict[str, Field]:
+    """The fields of the run of a model that take one text each, by name."""
+    entries = SHAFT_RUN.values() if form.with_loads else [*SETTLED_RUN.values(), DURATION, *ANY_RUN.values()]
     return {entry.name: described(entry, "/run") for entry in entries}
 
 

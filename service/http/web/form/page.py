@@ -169,7 +169,9 @@ def empty(model: str) -> Values:
     form = form_of(values)
     values |= {rows.name: str(rows.least) for rows in form.lists if rows.least}
     if form.with_run:
-        values |= {f"/run/{name}": run_fields()[name].default for name in ("until", "at_most", "tolerance", "reset")}
+        values |= {
+            f"/run/{name}": run_fields(form)[name].default for name in ("until", "at_most", "tolerance", "reset")
+        }
     values_of_base({}, values)
     return {**values, **form.new}
 
@@ -354,7 +356,7 @@ def sheet_form(request: Request, values: Values, checked: Checked | None, opened
         "component_rows": rows_with_components(values),
         "undoable": bool(history_of(values)),
         "presets": [preset_of(name) for name in (preset_names() if text_mode else examples_of(model))],
-        "run": run_fields(),
+        "run": run_fields(form_of(values)),
         "refine": refine_fields(),
         "limits": LIMITS,
         "categories": categories(model),

@@ -27,7 +27,7 @@ from sprag_study.service.reading.ranges import Spacing, TypedRange, typed_range
 from sprag_study.service.reading.together import with_last_unit
 from sprag_study.service.spec.axes.axes import SWEPT
 from sprag_study.service.spec.axes.sample import SAMPLE, SCALE
-from sprag_study.service.spec.described import ANY_RUN, SETTLED_RUN
+from sprag_study.service.spec.described import ANY_RUN, SETTLED_RUN, SHAFT_RUN
 from sprag_study.service.spec.kinds.goal import GOAL
 from sprag_study.service.spec.kinds.refine import REFINE
 from sprag_study.service.spec.kinds.tolerances import DRAWS
@@ -424,6 +424,24 @@ PARTS: Final = {
 _SAMPLE: Final = Record((*described(SAMPLE.described.values()), PARTS["ranges"]), whole="/count")
 _TIMES: Final = [entry for entry in (*SETTLED_RUN.values(), *ANY_RUN.values()) if entry.name != "until"]
 _RUN: Final = Record((_UNTIL, _WINDOW, *described(_TIMES)), key="run", when=lambda values: form_of(values).with_run)
+_SHAFT_RUN: Final = Record(
+    tuple(described(SHAFT_RUN.values())), key="run", when=lambda values: form_of(values).with_loads
+)
+
+
+class _Run:
+    """The run of a study, whose fields depend on the model."""
+
+    def entries(self, form: Filled) -> dict[str, Any]:
+        """As of a `Member`; no run where a machine shaft has nothing to say of it."""
+        found = _RUN.entries(form) or _SHAFT_RUN.entries(form)
+        return found if found.get("run") else {}
+
+    def show(self, item: Mapping[str, Any], form: Filled) -> set[str]:
+        """As of a `Member`."""
+        return (_SHAFT_RUN if _SHAFT_RUN.when(form.values) else _RUN).show(item, form)
+
+
 _GOAL: Final = Record(
     (PARTS["vary"], PARTS["best"], PARTS["subject_to"], _Points(), _START, *described(GOAL.described.values())),
     whole="", key="goal", when=is_search, new=GOAL_DEFAULTS,
@@ -437,7 +455,7 @@ _CASES: Final = Record(
     when=lambda values: not is_search(values),
 )  # fmt: skip
 _BATCH: Final = Record((Tolerances(), *described(DRAWS.values()), PARTS["correlations"]), when=with_batch)
-_STUDY: Final = Record((typed("name", str), Machine(), _RUN, _Quantities(), _BATCH, _GOAL, _CASES))
+_STUDY: Final = Record((typed("name", str), Machine(), _Run(), _Quantities(), _BATCH, _GOAL, _CASES))
 
 
 def quantities_of(values: Values) -> list[str]:
@@ -465,6 +483,8 @@ def values_of(spec: Mapping[str, Any]) -> Values:
         raise ValueError("the form does not know the model")
     values |= {BATCH: "on"} if FIELDS[0] in spec else {}
     _STUDY.fill({name: entry for name, entry in spec.items() if name not in ("sprag", "model")}, Filled(values))
-    if spec.get("combine", "grid") not in ("grid", "zip") or ("run" in spec and not _RUN.when(values)):
+    if spec.get("combine", "grid") not in ("grid", "zip") or (
+        "run" in spec and not any(each.when(values) for each in (_RUN, _SHAFT_RUN))
+    ):
         raise ValueError("the form has no fields for all of this spec")
     return values
