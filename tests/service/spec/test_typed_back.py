@@ -22,7 +22,7 @@ from sprag_study.service.cli.extend import _values
 from sprag_study.service.http.views import preset_of
 from sprag_study.service.http.web.form.entries import list_of, plain
 from sprag_study.service.http.web.form.fields import Field, refine_fields, run_fields, search_fields
-from sprag_study.service.http.web.form.machine import entries
+from sprag_study.service.http.web.form.machine import entries, form_of
 from sprag_study.service.http.web.form.page import empty
 from sprag_study.service.http.web.form.sent import settle
 from sprag_study.service.http.web.form.spec import spec_of, values_of
@@ -145,8 +145,9 @@ def _is_quantity(text: str) -> bool:
 
 def fields() -> Iterator[Field]:
     """Every field of the forms of all models, with each option of each choice."""
-    yield from (*run_fields().values(), *refine_fields().values(), *search_fields())
+    yield from (*refine_fields().values(), *search_fields())
     for model in models.model_names():
+        yield from run_fields(form_of({"model": model})).values()
         begun = empty(model) | {"stages": "1"}
         for choice in [entry for entry in entries(begun, hidden=True) if entry.field.choices]:
             for value, _label in choice.field.choices:
