@@ -32,7 +32,7 @@ from sprag_study.service.spec.text import Body
 from sprag_study.service.storage.errors import StoreError
 from sprag_study.service.views import row_files
 from sprag_study.service.views.case_pages import case_page, page_json, wanted
-from sprag_study.service.views.case_view import drawn, see, written
+from sprag_study.service.views.case_view import drawn, outside, see, written
 from sprag_study.service.views.cases import CASE_VIEWS
 from sprag_study.service.views.curves import pairs
 from sprag_study.service.views.explore import selection
@@ -193,7 +193,7 @@ class Here(Connection):
 
     def _case(self, study_id: str, study: Study, case: int, name: str | None, form: Any, query: Query) -> bytes:
         if case >= study.cases:
-            raise FaultError("case-not-found", f"The cases of this study are 0 .. {study.cases - 1}.")
+            raise FaultError("case-not-found", outside(study))
         if name is None:
             return to_bytes(case_detail(self.library.store, study_id, study, case))
         view = _known(CASE_VIEWS, name)

@@ -29,8 +29,8 @@ def list_document(name: str, items: Iterable[bytes]) -> Iterator[bytes]:
 
 
 def timestamp(moment: datetime) -> str:
-    """A time as RFC 3339 text in UTC."""
-    return moment.astimezone(UTC).isoformat().replace("+00:00", "Z")
+    """A time as RFC 3339 text in UTC with six decimals, whatever its fraction: ``2027-01-31T22:00:00.000000Z``."""
+    return moment.astimezone(UTC).isoformat(timespec="microseconds").replace("+00:00", "Z")
 
 
 def numbers(values: NDArray[np.float64], count: bool = False) -> list[float | int | None]:

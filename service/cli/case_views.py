@@ -127,8 +127,10 @@ def naming_options(study: Study, asked: Sequence[NamedSetting], lacks: str) -> I
         raise WrongInputError("invalid-parameter", _("invalid option"), faults) from error
 
 
-#: Codes of faults of names, which no further case of a study undoes.
+#: Codes of faults of names, which no further case of a study undoes where they say which value is meant.
 _OF_NAMES: Final = ("not-an-axis", "unknown-name", "not-numeric", "invalid-choice")
+#: Codes of faults of what a study is asked that its spec does not have.
+_OF_STUDIES: Final = ("not-used", "not-a-grid")
 
 
 @contextmanager
@@ -143,9 +145,12 @@ def before_run(study: Study, asked: Sequence[NamedSetting]) -> Iterator[None]:
 
 
 def _stays(fault: Fault) -> bool:
-    """Whether a fault stays whatever cases a study chooses: of a name, or of a view that it does not have."""
-    named = fault.code in _OF_NAMES and fault.value is not None
-    return named or fault.where is None or fault.code == "not-used"
+    """Whether a fault stays whatever cases a study chooses: of a name, or of a view that it does not have.
+
+    Where no axis is named and the first cases lie on no curve, as the designs of a search, it is to be named.
+    """
+    named = fault.code in _OF_NAMES and (fault.value is not None or fault.code == "not-an-axis")
+    return named or fault.where is None or fault.code in _OF_STUDIES
 
 
 def _named(options: dict[str, str], fault: Fault) -> str:

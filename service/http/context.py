@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Final, cast
 from fastapi import Depends, Path, Query, Request
 from starlette.convertors import Convertor, register_url_convertor
 
-from sprag_study.sentences import Sentence
 from sprag_study.service.http.computer import Computes
 from sprag_study.service.http.kept_files import KeptFiles
 from sprag_study.service.http.looks import Looks
@@ -18,6 +17,7 @@ from sprag_study.service.http.problems import ApiError
 from sprag_study.service.http.shares import Shares
 from sprag_study.service.settings import EffectiveSetting, Settings
 from sprag_study.service.storage.store import Store
+from sprag_study.service.views.case_view import outside
 from sprag_study.service.views.library import Library
 from sprag_study.worker.limits import (
     MAX_CASES,
@@ -134,7 +134,7 @@ def study_with(context: Context, study_id: str, case: int) -> Study:
     """The study, when it has that case; ApiError else."""
     study = context.store.studies.study(study_id)
     if case >= study.cases:
-        raise ApiError("case-not-found", Sentence("The cases of this study are 0 to {last}.", last=study.cases - 1))
+        raise ApiError("case-not-found", outside(study))
     return study
 
 

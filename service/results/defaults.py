@@ -25,7 +25,7 @@ from sprag_study.service.results.listed_cases import (
 )
 from sprag_study.service.results.refined import curve_plan, families
 from sprag_study.service.results.refined_maps import map_plan, squares
-from sprag_study.service.results.selection import axis_name, held_text, locate_axes, value_of
+from sprag_study.service.results.selection import axis_name, held_text, listed, locate_axes, value_of
 from sprag_study.worker import models
 from sprag_study.worker.directions import SWEEP
 from sprag_study.worker.models import NO_PARAMETERS
@@ -178,6 +178,7 @@ def completed(
             "no two cases of this study differ in one parameter only, so there is no curve"
             if varying_axes(study)
             else "nothing varies in this study, so there is no curve",
+            allowed=listed(axis.paths[0] for axis in varying_axes(study)) or None,
         )  # fmt: skip
     taken = {study.axis_of(path) for path in (*by, *(path for path, _ in (*at, *of)))}
     families = by or tuple(path for path in main.by if study.axis_of(path) not in taken)

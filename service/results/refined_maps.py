@@ -22,6 +22,7 @@ from sprag_study.worker.planning.rounds import Rows
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from sprag_study.worker.models import ResultInfo
     from sprag_study.worker.planning.refine import Map as Described
     from sprag_study.worker.study import Study
 
@@ -41,6 +42,21 @@ def squares(plan: RefinePlan) -> int:
     return min(plan.finest, MOST_SQUARES)
 
 
+def check_refined_map(
+    study: Study, plan: RefinePlan, names: tuple[str, str, str], at: Sequence[tuple[str, str]]
+) -> tuple[ResultInfo, tuple[int, int], dict[str, float]]:
+    """The result, the adaptive axes drawn as x and y, and what is held, for a map of ``names`` (x, y, result).
+
+    Raises SelectionError for what the plan does not refine, whichever cases it has chosen so far.
+    """
+    x, y, z = names
+    (result,) = numeric_results(models.study_results(study), "z", (z,))
+    sides = _sides(plan, x, y)
+    if z not in plan.results:
+        raise refused("z", "invalid-choice", "the map was not refined for this result", z, allowed=listed(plan.results))
+    return result, sides, _fixed_values(study, plan, at)
+
+
 def draw_refined_map(
     study: Study,
     plan: RefinePlan,
@@ -48,13 +64,9 @@ def draw_refined_map(
     at: Sequence[tuple[str, str]],
     fetch: Fetch,
 ) -> Map:
-    """The map of ``names`` (x, y, result); raises SelectionError."""
+    """The map of ``names`` (x, y, result); raises SelectionError as `check_refined_map` does."""
     x, y, z = names
-    (result,) = numeric_results(models.study_results(study), "z", (z,))
-    sides = _sides(plan, x, y)
-    if z not in plan.results:
-        raise refused("z", "invalid-choice", "the map was not refined for this result", z, allowed=listed(plan.results))
-    held = _fixed_values(study, plan, at)
+    result, sides, held = check_refined_map(study, plan, names, at)
     own, points = _described(study, plan, held, z, fetch)
     count = squares(plan)
     ends = [plan.adaptive[side] for side in sides]

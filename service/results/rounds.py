@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag_study.sentences import Amount
+from sprag_study.service.json_text import timestamp
 from sprag_study.service.languages import N_, decimal
 from sprag_study.service.reading.reader import Phrase, joined, plural
 from sprag_study.service.reading.wording import percent
@@ -37,7 +38,7 @@ def round_json(record: RoundRecord) -> Round:
         "round": record.round + 1,
         "first_case": record.cases.start,
         "cases": len(record.cases),
-        "planned_at": record.planned_at.isoformat(),
+        "planned_at": timestamp(record.planned_at),
         "summary": {name: value for name, value in record.summary.items() if name != "answer"},
     }
 

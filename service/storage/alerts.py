@@ -14,6 +14,7 @@ import sqlalchemy as sa
 from sprag_study.sentences import Sentence
 from sprag_study.service.actor import Role
 from sprag_study.service.delivery import is_mail_address, origin_of
+from sprag_study.service.json_text import timestamp
 from sprag_study.service.storage.part import Part, moment
 from sprag_study.service.storage.people.audit import note
 from sprag_study.service.storage.people.tables import USERS
@@ -80,7 +81,7 @@ class Alerts(Part):
             content = {
                 "alert": kind,
                 "sentence": str(problem),
-                "begun": moment(now).isoformat(),
+                "begun": timestamp(moment(now)),
                 "zone": zone,
                 "known": {"sentence_values": problem.to_json()},
             }

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, TypeVar
 
+from sprag_study.sentences import Sentence
 from sprag_study.service.figures.pictures import draw_figure
 from sprag_study.service.figures.read import read_figure
 from sprag_study.service.json_text import to_bytes
@@ -52,6 +53,11 @@ class CaseAnswer(Generic[Chosen, Result]):
     def parameters(self) -> dict[str, Value]:
         """The parameters of the case on axes and derived ones, SI."""
         return case_values(self.study, self.case)
+
+
+def outside(study: Study) -> Sentence:
+    """Which cases a study has, for who asks for another."""
+    return Sentence("The cases of this study are 0 to {last}.", last=study.cases - 1)
 
 
 @dataclass(frozen=True, slots=True)

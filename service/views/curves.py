@@ -20,6 +20,7 @@ from sprag_study.service.results.curve_cases import check_map, drawn_curves, sel
 from sprag_study.service.results.curves import CurveQuery, Curves, Map, Pairs, flag_names
 from sprag_study.service.results.defaults import completed, drawn_numbers
 from sprag_study.service.results.refined import not_joined
+from sprag_study.service.results.refined_maps import check_refined_map, map_plan
 from sprag_study.service.results.regimes import kind_columns
 from sprag_study.service.views import study_view
 from sprag_study.service.views.study_questions import CURVES, MAP, CurvesQuestion, MapQuestion
@@ -174,7 +175,12 @@ class MapView(StudyView[MapQuestion, tuple[CurveQuery, bool], Map]):
     def check(self, study: Study, chosen: tuple[CurveQuery, bool]) -> None:
         """The axes and the result."""
         query, _ = chosen
-        check_map(study, query.x, query.by[0], query.y[0], query.at)
+        names = query.x, query.by[0], query.y[0]
+        plan = map_plan(study)
+        if plan is None:
+            check_map(study, *names, query.at)
+        else:
+            check_refined_map(study, plan, names, query.at)
 
     def small(self, study: Study, chosen: tuple[CurveQuery, bool]) -> bool:
         """By the numbers of the map."""

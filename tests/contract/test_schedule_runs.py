@@ -59,7 +59,7 @@ def test_a_run_that_was_refused_in_the_meantime_gets_no_study(
     assert found.outcome.result is Result.REFUSED
     assert found.outcome.reason == f"The schedule was {verb} before a study was submitted."
     (refused,) = store.audit.rows(AuditFilter(action="schedule.refuse"))
-    assert (refused.target, refused.detail["due"]) == (schedule.id, "2026-01-01T01:00:00+00:00")
+    assert (refused.target, refused.detail["due"]) == (schedule.id, "2026-01-01T01:00:00.000000Z")
 
 
 def test_a_run_gets_one_study(store: Store, schedule: ScheduleRecord) -> None:

@@ -52,4 +52,4 @@ def test_times_are_told_in_utc() -> None:
         status: datetime
 
     moment = datetime(2026, 1, 1, 12, tzinfo=UTC)
-    assert filled(catalogue.Health, Once(moment), warnings=[])["status"] == "2026-01-01T12:00:00Z"
+    assert filled(catalogue.Health, Once(moment), warnings=[])["status"] == "2026-01-01T12:00:00.000000Z"

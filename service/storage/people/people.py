@@ -20,6 +20,7 @@ import sqlalchemy as sa
 from sprag_study.sentences import Sentence
 from sprag_study.service.actor import SERVED, Role, act_as, acting
 from sprag_study.service.faults import FaultError, parameter_error
+from sprag_study.service.json_text import timestamp
 from sprag_study.service.languages import N_, grouped, recorded
 from sprag_study.service.storage.components import COMPONENTS
 from sprag_study.service.storage.errors import TokenNotFoundError, UserExistsError, UserNotFoundError
@@ -493,7 +494,7 @@ def _new_token(
     token_id, owner = f"tk_{secrets.token_hex(6)}", fields["owner"]
     if owner is not None:
         require_user(connection, owner)
-    expires = None if ends is None else moment(ends).isoformat()
+    expires = None if ends is None else timestamp(moment(ends))
     note(connection, now, "token.create", token_id, **fields, expires=expires, **noted)
     digest = digest_of(secret.encode("ascii"))
     values = {**fields, "id": token_id, "digest": digest, "created_at": now, "expires_at": ends}

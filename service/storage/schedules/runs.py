@@ -266,7 +266,7 @@ class Runs(Part):
                     )
                 )
                 if each.too_late:
-                    note(connection, self._now(), "schedule.miss", record.id, due=each.due.isoformat(), problem=problem)
+                    note(connection, self._now(), "schedule.miss", record.id, due=timestamp(each.due), problem=problem)
         return bool(new)
 
     def open(self) -> list[OpenRun]:
@@ -525,7 +525,7 @@ def _change_open(connection: sa.Connection, schedule: int, due: int, **values: A
 
 
 def _note_end(connection: sa.Connection, now: int, action: str, schedule_id: str, due: int, problem: str) -> None:
-    note(connection, now, action, schedule_id, due=moment(due).isoformat(), problem=problem)
+    note(connection, now, action, schedule_id, due=timestamp(moment(due)), problem=problem)
 
 
 def _late(delay: timedelta, record: ScheduleRecord) -> str:

@@ -56,7 +56,7 @@ def test_a_schedule_is_kept_shown_changed_and_deleted(run: Run, service: Service
     assert run("change", name, "--at", "2099-01-31T22:00", "--window", "", "--no-fresh")[0] == 0
     changed = service.get(f"/schedules/{name}")
     assert (changed["cron"], changed["window"], changed["fresh"]) == (None, None, False)
-    assert changed["next_due"] == "2099-01-31T21:00:00Z"
+    assert changed["next_due"] == "2099-01-31T21:00:00.000000Z"
     assert "next run: 2099" in run("show", name)[2]
     assert json.loads(run("show", name, "--json")[1])["spec"] == SPEC
     assert run("delete", name)[0] == 0

@@ -198,6 +198,9 @@ def test_wrong_settings_name_their_options(
         (("show", "fastest_drive", "front", "--x", "nonsense"), "--x: is not a goal"),
         (("show", "fastest_drive", "cases", "--sort", "nonsense"), "--sort"),
         (("show", "fastest_drive", "calibration"), "the study is not a calibration"),
+        (("show", "fastest_drive", "curves"), "so there is no curve (allowed: excitation.frequency, "),
+        (("show", "fastest_drive", "map", "--x", "shaft.inertia", "--y", "excitation.frequency", "--z", "efficiency"),
+         "--x: a map needs a grid"),
     ):  # fmt: skip
         done = sprag(*line)
         assert (done.code, named in done.err) == (2, True), (line, done.err)

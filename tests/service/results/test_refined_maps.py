@@ -21,8 +21,9 @@ from sprag_study.service.report.document import made_document, report_of
 from sprag_study.service.results.curve_cases import draw_map
 from sprag_study.service.results.curves import Map
 from sprag_study.service.storage.studies.records import CaseColumns
+from sprag_study.service.views.curves import MapView
 from sprag_study.service.views.library import Library
-from sprag_study.service.views.study_questions import ReportQuestion
+from sprag_study.service.views.study_questions import MapQuestion, ReportQuestion
 from sprag_study.worker.study import Study
 from tests.service.conftest import API, Service
 from tests.service.figures.seen import seen
@@ -184,3 +185,15 @@ def test_squares_fill_the_map_to_its_ends(study: Study) -> None:
     for borders, ends in zip(map_edges(found), ((0.0, 1.0), (20.0, 30.0)), strict=True):
         assert borders.size == 33
         assert (borders[0], borders[-1]) == pytest.approx(ends)
+
+
+def test_a_refined_map_is_checked_before_it_has_rows(study: Study) -> None:
+    view = MapView()
+    view.check(study, view.choose(study, MapQuestion(LOAD, FREQUENCY, SPEED, at=[f"{MASS}=0.5"])))
+    for question, parameter in (
+        (MapQuestion(LOAD, MASS, SPEED, at=[]), "y"), (MapQuestion(LOAD, FREQUENCY, "torque.max", at=[]), "z"),
+        (MapQuestion(LOAD, FREQUENCY, SPEED, at=[]), "at"),
+    ):  # fmt: skip
+        with pytest.raises(SelectionError) as refused:
+            view.check(study, view.choose(study, question))
+        assert [fault.where for fault in refused.value.faults] == [parameter]

@@ -167,7 +167,7 @@ def test_a_copy_fires_nothing_until_it_is_adopted_and_the_original_goes_on(
     Reporter(copy, delivery).look()
     assert len(hook.requests) == 2 * (nights + 1)
     (schedule,) = http.get("/api/v1/schedules").json()["schedules"]
-    assert schedule["next_due"] == "2026-01-03T01:00:00Z"
+    assert schedule["next_due"] == "2026-01-03T01:00:00.000000Z"
     assert http.get(schedule["links"]["self"]).json()["off"] is http.get("/api/v1/schedules").json()["off"] is None
     assert "schedule_next_due_timestamp_seconds{" in http.get("/metrics").text
     assert OFF not in http.get("/nights").text

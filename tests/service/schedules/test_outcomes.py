@@ -186,7 +186,7 @@ def test_the_last_night_has_trouble_first(service: Service, clock: Clock) -> Non
     clock.set("2026-01-01T06:00")
     Scheduler(store).look()
     found = service.get("/night")
-    assert (found["since"], found["until"]) == ("2025-12-31T06:00:00Z", "2026-01-01T06:00:00Z")
+    assert (found["since"], found["until"]) == ("2025-12-31T06:00:00.000000Z", "2026-01-01T06:00:00.000000Z")
     assert [(run["name"], run["outcome"]["result"]) for run in found["runs"]] == [
         ("<b>odd</b>", "finished"),
         ("late", "queued"),

@@ -24,11 +24,11 @@ def test_the_interface_keeps_changes_disables_and_deletes(service: Service, cloc
     address = made.headers["location"]
     found = service.http.get(address).json()
     assert found == made.json()
-    assert found["next_due"] == "2026-01-01T21:00:00Z"
+    assert found["next_due"] == "2026-01-01T21:00:00.000000Z"
     assert (found["window"], found["spec"]) == (["22:00", "06:00"], EXAMPLE["spec"])
     changed = service.http.patch(address, json={"at": "2026-02-01T09:00", "window": None, "name": "once"}).json()
     assert (changed["cron"], changed["at"]) == (None, "2026-02-01T09:00:00+01:00")
-    assert (changed["window"], changed["name"], changed["next_due"]) == (None, "once", "2026-02-01T08:00:00Z")
+    assert (changed["window"], changed["name"], changed["next_due"]) == (None, "once", "2026-02-01T08:00:00.000000Z")
     assert service.http.patch(address, json={"enabled": False}).json()["next_due"] is None
     clock.set("2026-03-01T00:00")
     late = service.http.patch(address, json={"enabled": True, "name": "too late"})  # its time has passed

@@ -218,7 +218,7 @@ def test_a_time_is_shown_on_the_clock_of_its_zone() -> None:
 def test_the_interface_has_times_of_the_zone(service: Service, clock: Clock) -> None:
     body = {"spec": SPEC, "cron": "@daily", "zone": "Asia/Tokyo", "misfire_grace": "2 h", "catch_up": "none"}
     made = service.http.post("/api/v1/schedules", json=body).json()
-    assert (made["next_due"], made["next_due_local"]) == ("2026-01-01T15:00:00Z", "2026-01-02T00:00:00+09:00")
+    assert (made["next_due"], made["next_due_local"]) == ("2026-01-01T15:00:00.000000Z", "2026-01-02T00:00:00+09:00")
     assert (made["overlap"], made["catch_up"], made["misfire_grace"]) == ("queue", "none", "2 h")
     clock.set("2026-01-01T15:00")
     Scheduler(service.store).look()

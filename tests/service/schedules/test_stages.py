@@ -155,7 +155,7 @@ def test_they_are_answered_and_kept_when_the_study_is_deleted(service: Service, 
     found = {stage["stage"]: stage["seconds"] for stage in run["stages"]}
     assert found == {"waiting": 570.0, "compiling": 30.0, "computing": 1_798.0, "writing": 2.0}
     computing = next(stage for stage in run["stages"] if stage["stage"] == "computing")
-    assert computing["begin"] == "2026-01-01T01:10:00Z"
+    assert computing["begin"] == "2026-01-01T01:10:00.000000Z"
     assert computing["begin_local"] == "2026-01-01T02:10:00+01:00"
     assert last(service.store, schedule).stages is not None
     service.store.studies.delete(study, at_once=True)
