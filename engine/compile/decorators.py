@@ -9,6 +9,7 @@ from numba.core.compiler import CompilerBase
 from numba.core.types import unliteral
 from numba.extending import intrinsic
 
+from sprag_study.engine.compile.places import use_cache
 from sprag_study.engine.compile.program import PartCompiler, ProgramCompiler
 
 P = ParamSpec("P")
@@ -37,6 +38,7 @@ def inlined(function: Callable[P, R]) -> Callable[P, R]:
 def _compiled(
     function: Callable[P, R], pipeline_class: type[CompilerBase], forceinline: bool = False
 ) -> Callable[P, R]:
+    use_cache()
     decorate = numba.njit(cache=True, error_model="numpy", pipeline_class=pipeline_class, forceinline=forceinline)
     return cast(Callable[P, R], _for_any_number(decorate(function)))
 

@@ -44,7 +44,12 @@ class EngineCacheLocator(UserProvidedCacheLocator):
 
 
 def use_cache() -> None:
-    """Make numba keep compiled code in the engine's cache."""
+    """Make numba keep compiled code in the engine's cache; called before each function is decorated.
+
+    A compilation resets all of numba's settings when a variable ``NUMBA_...`` of the environment has changed, as a pool
+    of processes changes one. Functions decorated after that, such as those of the next kernel, would be compiled again
+    in other folders.
+    """
     own = f"{__name__}.{EngineCacheLocator.__name__}"
     for name, value in (
         ("CACHE_DIR", str(cache_folder())),

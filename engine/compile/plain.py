@@ -15,6 +15,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from sprag_study.engine.compile.fused import fused
+from sprag_study.engine.compile.places import use_cache
 from sprag_study.engine.compile.ways import GROUP
 
 P = ParamSpec("P")
@@ -23,6 +24,7 @@ R = TypeVar("R")
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """Compile ``function`` on first call and keep the machine code in numba's on-disk cache; strict arithmetic."""
+    use_cache()
     return cast(Callable[P, R], numba.njit(cache=True, error_model="numpy")(function))
 
 

@@ -7,11 +7,14 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any, cast
 
+import numba
 import pytest
 from numba.core.caching import UserProvidedCacheLocator
 
 from sprag_study.engine.compile import jit, places
+from sprag_study.engine.compile.cache import cache_folder
 from sprag_study.engine.sources import engine_folder
 from tests.conftest import ROOT
 
@@ -47,10 +50,18 @@ def test_a_second_installation_compiles_nothing(tmp_path: Path) -> None:
     assert (compiled, loaded) == ([1, 0], [0, 1])
 
 
+def test_functions_have_their_folder_after_a_variable_of_numba_has_changed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A pool of processes changes one, and the next compilation resets all settings of numba."""
+    monkeypatch.setenv("NUMBA_NUM_THREADS", "1" if os.environ.get("NUMBA_NUM_THREADS") != "1" else "2")
+    numba.core.config.reload_config()
+    assert not numba.config.CACHE_DIR
+    stats = cast(Any, jit.compiled(lambda: 1)).stats
+    assert Path(stats.cache_path).is_relative_to(cache_folder())
+
+
 def test_functions_of_others_have_folders_of_their_own() -> None:
-    places.use_cache()  # as the first compilation does
     inside, outside = places.EngineCacheLocator, UserProvidedCacheLocator
-    own = inside.from_function(jit.use_cache, str(engine_folder() / "compile" / "places.py"))
+    own = inside.from_function(places.use_cache, str(engine_folder() / "compile" / "places.py"))
     assert Path(own.get_cache_path()).name == "engine-compile"
     assert inside.from_function(ask, __file__) is None
     assert outside.from_function(ask, __file__).get_cache_path() != own.get_cache_path()
@@ -59,4 +70,4 @@ def test_functions_of_others_have_folders_of_their_own() -> None:
 def test_a_folder_that_cannot_be_written_to_is_none(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     monkeypatch.setattr(places, "cache_folder", lambda: tmp_path / "file")
-    assert places.EngineCacheLocator.from_function(jit.use_cache, str(engine_folder() / "run.py")) is None
+    assert places.EngineCacheLocator.from_function(places.use_cache, str(engine_folder() / "run.py")) is None
