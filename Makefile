@@ -12,7 +12,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input --quiet --qui
 # The tests start many processes: compiling all modules anew in each would be a third of their time.
 unexport PYTHONDONTWRITEBYTECODE
 
-# mypy, which comes first, takes as long as the others and the kernels together.
+# mypy and the kernels, which come first, take longer than the others together.
 CHECKS := mypy ruff imports reference catalogues collect
 SIDE_BY_SIDE = $(MAKE) --no-print-directory --jobs 2 $(if $(filter output-sync,$(.FEATURES)),--output-sync)
 
@@ -48,7 +48,7 @@ dist: docs
 # The tests of one file share processes and servers, so they stay together, as do some files (TOGETHER in tests/conftest.py).
 # Many wait for processes of the program, so that three run side by side even on two cores.
 test: $(DEV)
-	@$(SIDE_BY_SIDE) $(CHECKS) kernels
+	@$(SIDE_BY_SIDE) kernels $(CHECKS)
 	$(BIN)/python -m pytest --numprocesses 3 --dist loadfile --no-loadscope-reorder
 
 check: $(DEV)
@@ -74,9 +74,9 @@ catalogues: $(DEV)
 collect: $(DEV)
 	$(BIN)/python -m pytest --collect-only --quiet --quiet >$(VENV)/collected || (cat $(VENV)/collected; exit 1)
 
-# Processes that begin side by side would each compile what the formulas of shafts need.
+# Processes that begin side by side would each compile them.
 kernels: $(DEV)
-	$(BIN)/sprag run examples/compressor.toml >/dev/null
+	$(BIN)/python -m tests.kernels
 
 # No part of `make test`: it installs everything twice.
 bounds: $(DEV)
