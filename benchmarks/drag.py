@@ -13,14 +13,14 @@ import sys
 from benchmarks.compared_drives import compare_all
 from tests.engine.vibration_drive.test_against_scipy import compare
 from tests.engine.vibration_drive.test_drag import damped, resisted
-from tests.engine.vibration_drive.test_load_curves import bent
+from tests.engine.vibration_drive.test_load_curves import bent, tabled
 
 _CLOSELY = 1e-9
 
 
 def compare_drag(number: int) -> bool:
     """Compare a drive; every third of them has literal resets."""
-    machines = (resisted, bent, damped, bent)[number % 4]
+    machines = (resisted, bent, damped, tabled)[number % 4]
     (columns,) = machines(1 + number % 3 // 2, 10_000 + number, 1)
     return bool(compare(columns, "literal" if number % 3 == 1 else "contact", _CLOSELY))
 

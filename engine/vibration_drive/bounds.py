@@ -121,7 +121,7 @@ class _Watch:
         block = layout.x_speed_max - layout.speed_max
         edges = layout.m_sum_high - layout.sum_high
         speeds = span(code, "W", self.speed)
-        self.guard(speeds, edges, layout.speed_low, None)
+        self.guard(speeds, edges, layout.speed_low, layout.speed_high if layout.tabled else None)
         self.peak(speeds, block, layout.speed_max, layout.speed_min)
         self.peak(rate_span(code, "A", self.speed, self.inverse_h), block, layout.acc_max)
         total = self.torques[0]

@@ -8,13 +8,23 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sprag_study.engine.run import Run
-from sprag_study.engine.vibration_drive.parameters import CURVE, DRAG, MAX_COEFFICIENTS, MAX_PENDULUMS, PARAMETERS
+from sprag_study.engine.vibration_drive.parameters import (
+    CURVE,
+    DRAG,
+    LOAD_FACTOR,
+    LOAD_TABLE,
+    MAX_COEFFICIENTS,
+    MAX_LOAD_ROWS,
+    MAX_PENDULUMS,
+    PARAMETERS,
+)
 
 Floats = NDArray[np.float64]
 
 
 class Column(IntEnum):
-    """Columns of a case that its excitation and its shaft have; after them come the stops, then the pendulums."""
+    """Columns of a case that its excitation and its shaft have; after them come the speeds and the torques of the table
+    of its load, the stops, then the pendulums."""
 
     NU = 0
     PERIOD = auto()
@@ -56,7 +66,10 @@ class PendulumColumn(IntEnum):
     CLUTCH = auto()
 
 
-SHAFT_COLUMNS = len(Column)
+#: Columns with the speeds of the rows of the table of the load, and with their torques.
+TABLE_SPEEDS = slice(len(Column), len(Column) + MAX_LOAD_ROWS)
+TABLE_TORQUES = slice(TABLE_SPEEDS.stop, TABLE_SPEEDS.stop + MAX_LOAD_ROWS)
+SHAFT_COLUMNS = TABLE_TORQUES.stop
 #: Stops, each a pair of columns: whole periods, fraction.
 STOPS = 4
 PENDULUM_COLUMNS = len(PendulumColumn)
@@ -118,9 +131,27 @@ def has_curve(paths: Iterable[str]) -> bool:
     return any(path.rpartition(".")[2] in CURVE for path in paths)
 
 
+def has_table(paths: Iterable[str]) -> bool:
+    """Whether any of the parameters is that of a load that is given as a table."""
+    return any(path.startswith(LOAD_TABLE) for path in paths)
+
+
+def load_table(columns: Mapping[str, ArrayLike], cases: int) -> tuple[Floats, Floats]:
+    """Speeds (rad/s) and torques (N*m) of the tables of the loads, shape (cases, MAX_LOAD_ROWS) each.
+
+    The torques have their factor. Rows that a table does not have are at an infinite speed.
+    """
+    speeds, torques = np.full((cases, MAX_LOAD_ROWS), math.inf), np.zeros((cases, MAX_LOAD_ROWS))
+    for k in range(MAX_LOAD_ROWS if has_table(columns) else 0):
+        speeds[:, k] = columns.get(f"{LOAD_TABLE}{k}.speed", math.inf)
+        torques[:, k] = columns.get(f"{LOAD_TABLE}{k}.torque", 0.0)
+    factor = np.asarray(columns.get(LOAD_FACTOR, 1.0), dtype=np.float64)
+    return speeds, torques * factor.reshape(-1, 1)
+
+
 def load_at_rest(matrix: Floats) -> Floats:
     """Mean torque in N*m up to which the load of each case of a matrix holds a shaft that stands, shape (cases,)."""
-    load: Floats = matrix[:, Column.LOAD] + matrix[:, Column.STRIBECK]
+    load: Floats = matrix[:, Column.LOAD] + matrix[:, Column.STRIBECK] + matrix[:, TABLE_TORQUES.start]
     return load
 
 
@@ -131,14 +162,16 @@ def swings(matrix: Floats) -> NDArray[np.bool_]:
 
 
 def bends(matrix: Floats) -> NDArray[np.bool_]:
-    """Whether the load of each case of a matrix has a term that does not rise with the speed, shape (cases,)."""
-    bent: NDArray[np.bool_] = swings(matrix) | (matrix[:, Column.STRIBECK] > 0.0)
+    """Whether the load of each case of a matrix has a term that need not rise with the speed, shape (cases,)."""
+    tabled = np.any(matrix[:, TABLE_TORQUES] > 0.0, axis=1)
+    bent: NDArray[np.bool_] = swings(matrix) | (matrix[:, Column.STRIBECK] > 0.0) | tabled
     return bent
 
 
 def unloaded(matrix: Floats, pendulums: int) -> NDArray[np.bool_]:
     """Whether nothing resists the shaft of each case of a matrix, so that every speed that no clutch changes lasts."""
-    resisting = [Column.LOAD, Column.BEARING, Column.LINEAR, Column.QUADRATIC, Column.STRIBECK]
+    terms = (Column.LOAD, Column.BEARING, Column.LINEAR, Column.QUADRATIC, Column.STRIBECK)
+    resisting = [*map(int, terms), *range(TABLE_TORQUES.start, TABLE_TORQUES.stop)]
     # A drive with drag in an overrunning clutch has a backstop.
     width = (matrix.shape[1] - stop_column(STOPS)) // pendulums
     drags = matrix[:, stop_column(STOPS) + PendulumColumn.OVERRUNNING_DAMPING :: width]
@@ -185,9 +218,9 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
     -------
     array, shape (cases, columns)
         `Column`: nu, period, d nu^2, b nu^2, chi, g, M_c, lambda_e, k_1, k_2, M_s, 1/omega_s, kappa M_c, m, psi, J_e,
-        1/rate, initial speed, step budget; four stops; per pendulum `PendulumColumn`: M l/J, c a^2/J, lambda/J,
-        1/J, J, delta, u_end, lambda_k, lambda_o, initial angle, speed, windup and state of the clutch; its clutch
-        coefficients.
+        1/rate, initial speed, step budget; the table of the load; four stops; per pendulum `PendulumColumn`: M l/J,
+        c a^2/J, lambda/J, 1/J, J, delta, u_end, lambda_k, lambda_o, initial angle, speed, windup and state of the
+        clutch; its clutch coefficients.
     """
     n, count = pendulum_count(columns), coefficient_count(columns)
 
@@ -258,7 +291,8 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
         C.MOST_STEPS: run.step_budget(cycles),
     }  # fmt: skip
     stops = [part for time in times for part in _stop(time)]
-    return np.ascontiguousarray(np.column_stack([*(shaft[place] for place in C), *stops, *pendulums]))
+    table = load_table(columns, cases)
+    return np.ascontiguousarray(np.column_stack([*(shaft[place] for place in C), *table, *stops, *pendulums]))
 
 
 def stop_column(stop: int) -> int:

@@ -6,7 +6,7 @@ by J:
 
     w' = (M l/J) (x'' cos phi + y'' sin phi + g sin phi) - (c a^2/J) phi - (lambda/J) w - T/J
     shaft' = (sum T - M_c - (lambda_e + k_1) shaft - k_2 shaft^2 - B) / J_e
-    B = M_s exp(-shaft/omega_s) + kappa M_c cos theta,   theta' = m shaft
+    B = M_s exp(-shaft/omega_s) + kappa M_c cos theta + level + slope shaft,   theta' = m shaft
     T = sum c_k u^(k-1) + rate u'                  u' = w - shaft
 
 Modes enter as numbers, not branches: the law in force is zero where a clutch is free and a straight line beyond the
@@ -199,6 +199,7 @@ def series_loop(layout: Layout) -> str:
 class _Curve:
     """Series of B, the terms of the load that are no polynomial of the speed.
 
+    Of a table, the line level + slope shaft on which the speed is belongs to it: its corners are events.
     y = M_s exp(-shaft/omega_s) has y' = -(shaft'/omega_s) y, and sine and cosine of theta have (sin)' = m shaft cos.
     """
 
@@ -208,6 +209,7 @@ class _Curve:
         self.cyclic, self.cycles = code.load("cyclic", layout.cyclic), code.load("cycles", layout.cycles)
         sine, cosine = sincos(code, code.load("cycle", layout.cycle), "e")
         self.sine, self.cosine = [sine], [cosine]
+        self.line = [code.load(name, getattr(layout, name)) for name in ("level", "slope")] if layout.tabled else []
         self.falling: list[Term] = []
         self.series: list[Term] = []
 
@@ -224,7 +226,11 @@ class _Curve:
             self.sine.append(sine)
             self.cosine.append(cosine)
         self.falling.append(code.let(f"E{k}", value))
-        self.series.append(code.let(f"B{k}", f"{self.falling[k]} + {self.cyclic}*{self.cosine[k]}"))
+        value = f"{self.falling[k]} + {self.cyclic}*{self.cosine[k]}"
+        if self.line:
+            level, slope = self.line
+            value += f" + {slope}*{self.shaft[k]}" + (f" + {level}" if k == 0 else "")
+        self.series.append(code.let(f"B{k}", value))
 
 
 def _watched(code: LaneCode, step: Term, bent: _Curve, shaft: list[Term], order: int) -> str:

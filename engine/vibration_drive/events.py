@@ -15,11 +15,13 @@ from sprag_study.engine.vibration_drive.states import (
     EVENT_PENDULUM,
     EVENT_SMOOTH,
     EVENT_TARGET,
+    FASTER,
     FREE,
     HELD,
     LANE_INTEGERS,
     LITERAL,
     LOCKED,
+    NEVER,
     NO_EVENT,
     OF_SHAFT,
     ROTATING,
@@ -29,9 +31,12 @@ from sprag_study.engine.vibration_drive.states import (
     SKIP_T,
     SKIP_U,
     SKIP_W,
+    SLOWER,
     START,
     TAKE_UP,
+    is_held,
     set_clutch,
+    set_piece,
     set_shaft,
     stored_energy,
     total,
@@ -131,7 +136,13 @@ def collect_guards(W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, blocks
     # Clutches that overrun or take up their backlash never push: without a dry load their drag vanishes as an
     # interaction starts, and rounding would decide whether that frees the shaft.
     idle = lay.drag == 1 and shaft == HELD and not W[lay.driven, lane] > 0.0
+    if lay.tabled == 1 and shaft == ROTATING and not W[lay.m_speed_high, lane] > 0.0:
+        for k in range(lay.order + 1):
+            g[k] = -W[lay.speed + k, lane]
+        g[0] += W[lay.speed_high, lane]
+        used = _enter(W, Z, lay, lane, OF_SHAFT, FASTER, g, blocks, meta, used)
     if not (idle or W[lay.m_sum_high if shaft == HELD else lay.m_speed_low, lane] > 0.0):
+        slower = lay.tabled == 1 and shaft == ROTATING and W[lay.speed_low, lane] > 0.0
         if shaft == HELD:
             total(W, lay, lane, g)
             for k in range(lay.order + 1):
@@ -140,10 +151,12 @@ def collect_guards(W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, blocks
         else:
             for k in range(lay.order + 1):
                 g[k] = W[lay.speed + k, lane]
-            if fresh:
+            if slower:
+                g[0] -= W[lay.speed_low, lane]
+            elif fresh:
                 for k in range(Z[lane, SKIP_SHAFT]):
                     g[k] = 0.0
-        target = ROTATING if shaft == HELD else HELD
+        target = SLOWER if slower else (ROTATING if shaft == HELD else HELD)
         used = _enter(W, Z, lay, lane, OF_SHAFT, target, g, blocks, meta, used)
     literal = Z[lane, LITERAL]
     for i in range(lay.n):
@@ -266,6 +279,24 @@ def _drop_windup(W: Floats, lay: Layout, lane: int, i: int) -> None:
 
 
 @part
+def _transit_shaft(W: Floats, Z: Ints, lay: Layout, lane: int, target: int) -> None:
+    """Carry out an event of the shaft."""
+    if target >= SLOWER:
+        W[lay.speed_low, lane] = 0.0 if is_held(W, lay, lane) else -NEVER
+        set_piece(W, Z, lay, lane, int(W[lay.piece, lane]) + (1 if target == FASTER else -1))
+        return
+    Z[lane, SKIP_SHAFT] = 0
+    W[lay.speed, lane] = 0.0
+    for j in range(lay.n):
+        # A locked pendulum stops with the shaft.
+        if Z[lane, j] == LOCKED:
+            W[lay.pendulums + j * lay.stride + lay.p_speed, lane] = 0.0
+    set_shaft(W, Z, lay, lane, target)
+    if target == ROTATING and Z[lane, EVENT_SMOOTH] == 1:
+        _break_away(W, Z, lay, lane)
+
+
+@part
 def transit(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
     """Carry out the event that ended a lane's step: exact values at the crossing, then the new state.
 
@@ -280,15 +311,7 @@ def transit(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
         for k in range(SKIP_SHAFT, LANE_INTEGERS):
             Z[lane, k] = 0
     if i == OF_SHAFT:
-        Z[lane, SKIP_SHAFT] = 0
-        W[lay.speed, lane] = 0.0
-        for j in range(lay.n):
-            # A locked pendulum stops with the shaft.
-            if Z[lane, j] == LOCKED:
-                W[lay.pendulums + j * lay.stride + lay.p_speed, lane] = 0.0
-        set_shaft(W, Z, lay, lane, target)
-        if target == ROTATING and smooth:
-            _break_away(W, Z, lay, lane)
+        _transit_shaft(W, Z, lay, lane, target)
         return
     base = lay.pendulums + i * lay.stride
     source = Z[lane, i]

@@ -24,7 +24,7 @@ from sprag_study.engine.taylor.batch import ROWS, SLOTS, peaks_loop, roots_loop
 from sprag_study.engine.taylor.straight import same_everywhere
 from sprag_study.engine.vibration_drive.advance import advance_loop
 from sprag_study.engine.vibration_drive.bounds import bounds_loop
-from sprag_study.engine.vibration_drive.cases import coefficient_count, has_curve, has_drag, pendulum_count
+from sprag_study.engine.vibration_drive.cases import coefficient_count, has_curve, has_drag, has_table, pendulum_count
 from sprag_study.engine.vibration_drive.equations import series_loop
 from sprag_study.engine.vibration_drive.layout import Layout, make_layout
 
@@ -204,17 +204,26 @@ def _write(path: Path, text: str) -> None:
 
 @cache
 def kernel(
-    pendulums: int, coefficients: int, order: int, lanes: int, *, drag: bool = False, curved: bool = False
+    pendulums: int,
+    coefficients: int,
+    order: int,
+    lanes: int,
+    *,
+    drag: bool = False,
+    curved: bool = False,
+    tabled: bool = False,
 ) -> Kernel:
     """The kernel of one shape, generated or loaded from the cache.
 
-    ``drag``: with torques that depend on speeds; ``curved``: with loads that are no polynomials of the speed, too.
+    ``drag``: with torques that depend on speeds; ``curved``: with loads that are no polynomials of the speed, too;
+    ``tabled``: with a load that is a table over it besides.
     """
-    terms = "_curved" if curved else "_drag" if drag else ""
+    terms = "_tabled" if tabled else "_curved" if curved else "_drag" if drag else ""
     name = f"drive_n{pendulums}_c{coefficients}_p{order}_l{lanes}{terms}"
     path = cache_folder() / f"{name}.py"
     if not path.exists():
-        _write(path, source(make_layout(pendulums, coefficients, order, lanes, drag=drag, curved=curved)))
+        layout = make_layout(pendulums, coefficients, order, lanes, drag=drag, curved=curved, tabled=tabled)
+        _write(path, source(layout))
     spec = importlib.util.spec_from_file_location(f"sprag_kernels.{name}", path)
     assert spec is not None
     assert spec.loader is not None
@@ -233,6 +242,8 @@ def kernel_of(columns: Mapping[str, ArrayLike], tolerance: float) -> Kernel:
         If the number of pendulums or coefficients is out of range.
     """
     shape = pendulum_count(columns), coefficient_count(columns), order_for(tolerance), lane_count()
+    if has_table(columns):
+        return kernel(*shape, drag=True, curved=True, tabled=True)
     if has_curve(columns):
         return kernel(*shape, drag=True, curved=True)
     return kernel(*shape, drag=True) if has_drag(columns) else kernel(*shape)

@@ -14,9 +14,18 @@ from sprag_study.engine.vibration_drive import states as ev
 from sprag_study.engine.vibration_drive.advance import ANGLE_BOUND, SPEED_BOUND, STEP_FLOOR
 from sprag_study.engine.vibration_drive.automaton import Clutch, Shaft
 from sprag_study.engine.vibration_drive.bounds import TOO_LONG
-from sprag_study.engine.vibration_drive.cases import PENDULUM_COLUMNS, STOPS, Column, PendulumColumn, stop_column
+from sprag_study.engine.vibration_drive.cases import (
+    PENDULUM_COLUMNS,
+    STOPS,
+    TABLE_SPEEDS,
+    TABLE_TORQUES,
+    Column,
+    PendulumColumn,
+    stop_column,
+)
 from sprag_study.engine.vibration_drive.events import collect_guards, transit
 from sprag_study.engine.vibration_drive.layout import OUT_ENDING, OUT_EVENTS, OUT_RUNUP, OUT_STEPS, OUT_SUMS, Layout
+from sprag_study.engine.vibration_drive.parameters import MAX_LOAD_ROWS
 from sprag_study.engine.vibration_drive.states import count_event, is_held, law, set_clutch, set_shaft, watch_fall
 from sprag_study.engine.vibration_drive.stops import next_stop
 from sprag_study.engine.vibration_drive.strobes import FRACTION, begin_at, note
@@ -47,10 +56,40 @@ _BEARING, _LINEAR, _QUADRATIC = int(Column.BEARING), int(Column.LINEAR), int(Col
 _STRIBECK, _STRIBECK_RATE = int(Column.STRIBECK), int(Column.STRIBECK_RATE)
 _CYCLIC, _CYCLES, _CYCLE = int(Column.CYCLIC), int(Column.CYCLES), int(Column.CYCLE)
 _INVERSE_RATE, _SPEED, _MOST_STEPS = int(Column.INVERSE_RATE), int(Column.SPEED), int(Column.MOST_STEPS)
+_TABLE_SPEEDS, _TABLE_TORQUES = int(TABLE_SPEEDS.start), int(TABLE_TORQUES.start)
 _FIRST_PENDULUM = stop_column(STOPS)
 _P_COPIED = int(PendulumColumn.OVERRUNNING_DAMPING) + 1
 _P_ANGLE, _P_SPEED = int(PendulumColumn.ANGLE), int(PendulumColumn.SPEED)
 _P_WINDUP, _P_CLUTCH = int(PendulumColumn.WINDUP), int(PendulumColumn.CLUTCH)
+
+
+@part
+def _load_shaft(W: Floats, lay: Layout, lane: int, row: Floats) -> None:
+    """Copy what a row of ``cases.case_matrix`` has of excitation and shaft."""
+    W[lay.nu, lane] = row[_NU]
+    W[lay.period, lane] = row[_PERIOD]
+    W[lay.acc_x, lane] = row[_ACC_X]
+    W[lay.acc_y, lane] = row[_ACC_Y]
+    W[lay.cos_chi, lane] = cosine(row[_CHI])
+    W[lay.sin_chi, lane] = sine(row[_CHI])
+    W[lay.gravity, lane] = row[_GRAVITY]
+    W[lay.load, lane] = row[_LOAD]
+    W[lay.linear, lane] = row[_BEARING] + row[_LINEAR]
+    W[lay.quadratic, lane] = row[_QUADRATIC]
+    W[lay.generator, lane] = row[_LINEAR]
+    W[lay.stribeck, lane] = row[_STRIBECK]
+    W[lay.stribeck_rate, lane] = row[_STRIBECK_RATE]
+    W[lay.cyclic, lane] = row[_CYCLIC]
+    W[lay.cycles, lane] = row[_CYCLES]
+    W[lay.cycle, lane] = row[_CYCLE]
+    if lay.tabled == 1:
+        for k in range(MAX_LOAD_ROWS):
+            W[lay.table_speed + k, lane] = row[_TABLE_SPEEDS + k]
+            W[lay.table_torque + k, lane] = row[_TABLE_TORQUES + k]
+    W[lay.inertia, lane] = row[_INERTIA]
+    W[lay.inverse_rate, lane] = row[_INVERSE_RATE]
+    W[lay.most_steps, lane] = row[_MOST_STEPS]
+    W[lay.speed, lane] = row[_SPEED]
 
 
 @part
@@ -69,26 +108,7 @@ def load_case(
     Z[lane, ev.CASE] = case
     Z[lane, ev.LITERAL] = literal
     Z[lane, ev.EVENT_PENDULUM] = ev.NO_EVENT
-    W[lay.nu, lane] = row[_NU]
-    W[lay.period, lane] = row[_PERIOD]
-    W[lay.acc_x, lane] = row[_ACC_X]
-    W[lay.acc_y, lane] = row[_ACC_Y]
-    W[lay.cos_chi, lane] = cosine(row[_CHI])
-    W[lay.sin_chi, lane] = sine(row[_CHI])
-    W[lay.gravity, lane] = row[_GRAVITY]
-    W[lay.load, lane] = row[_LOAD]
-    W[lay.linear, lane] = row[_BEARING] + row[_LINEAR]
-    W[lay.quadratic, lane] = row[_QUADRATIC]
-    W[lay.generator, lane] = row[_LINEAR]
-    W[lay.stribeck, lane] = row[_STRIBECK]
-    W[lay.stribeck_rate, lane] = row[_STRIBECK_RATE]
-    W[lay.cyclic, lane] = row[_CYCLIC]
-    W[lay.cycles, lane] = row[_CYCLES]
-    W[lay.cycle, lane] = row[_CYCLE]
-    W[lay.inertia, lane] = row[_INERTIA]
-    W[lay.inverse_rate, lane] = row[_INVERSE_RATE]
-    W[lay.most_steps, lane] = row[_MOST_STEPS]
-    W[lay.speed, lane] = row[_SPEED]
+    _load_shaft(W, lay, lane, row)
     for i in range(lay.n):
         base = lay.pendulums + i * lay.stride
         column = _FIRST_PENDULUM + i * (PENDULUM_COLUMNS + lay.coefficients)
@@ -154,7 +174,9 @@ def _take_event(W: Floats, Z: Ints, lay: Layout, lane: int, h: float, most_event
     """Carry out the event at the step's end and count it; the ending it causes, if any."""
     Z[lane, ev.EVENTS_AT_ONCE] = 0 if h > 0.0 else Z[lane, ev.EVENTS_AT_ONCE] + 1
     pendulum = Z[lane, ev.EVENT_PENDULUM]
-    counts = pendulum == ev.OF_SHAFT or Z[lane, pendulum] != Z[lane, ev.EVENT_TARGET]
+    counts = Z[lane, ev.EVENT_TARGET] < ev.SLOWER
+    if pendulum != ev.OF_SHAFT:
+        counts = Z[lane, pendulum] != Z[lane, ev.EVENT_TARGET]
     locked = pendulum != ev.OF_SHAFT and Z[lane, pendulum] == _LOCKED
     transit(W, Z, lay, lane)
     # A lock may hold after all, where another one opens.

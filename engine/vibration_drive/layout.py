@@ -10,6 +10,8 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
+from sprag_study.engine.vibration_drive.parameters import MAX_LOAD_ROWS
+
 # Whole-run values of a case, in the first columns of its row of sums.
 OUT_ENDING, OUT_STEPS, OUT_EVENTS, OUT_RUNUP, OUT_SUMS = 0, 1, 2, 3, 4
 
@@ -49,6 +51,8 @@ class Layout(NamedTuple):
     drag: int
     # whether the load has terms that are no polynomial of the speed (`parameters.CURVE`): 0 or 1, with drag only
     curved: int
+    # whether the load has a table over the speed (`parameters.LOAD_TABLE`): 0 or 1, with curved only
+    tabled: int
     order: int
     lanes: int
     rows: int
@@ -78,15 +82,23 @@ class Layout(NamedTuple):
     stribeck_rate: int
     cyclic: int
     cycles: int
+    # rows of the table of the load: MAX_LOAD_ROWS speeds and torques each, where `tabled` says so
+    table_speed: int
+    table_torque: int
     inertia: int
     inverse_rate: int
     most_steps: int
-    # mode: 1/(inertia that turns with the shaft), 0 where it is held; flags; bands of the guards
+    # mode: 1/(inertia that turns with the shaft), 0 where it is held; flags; bands of the guards; the row of the load's
+    # table before which the speed is, and the line level + slope * speed there
     mobility: int
     rotating: int
     driven: int
     sum_high: int
     speed_low: int
+    speed_high: int
+    piece: int
+    level: int
+    slope: int
     # step: size planned, size wanted by the tolerance, part of the planned step taken (x = 1 without an event), whether
     # it ends at f_stop, smallest distance of a guarded quantity to its band, largest excess over a known extremum,
     # whether anything but the next step has to happen, number of steps so far
@@ -143,6 +155,7 @@ class Layout(NamedTuple):
     # distance of this step to the shaft's guards
     m_sum_high: int
     m_speed_low: int
+    m_speed_high: int
     # series of the shaft's speed, order + 1 coefficients, in fractions of the planned step, and where `curved` says so
     # that of the load's torque beside its polynomial
     speed: int
@@ -243,19 +256,29 @@ _beside(
     f"p_x_{_EXTREMA.format('p_x_')}",
     _SHAFT_EXTREMA.format(""),
     f"x_{_SHAFT_EXTREMA.format('x_')}",
-    "sum_high speed_low",
-    "m_sum_high m_speed_low",
+    "sum_high speed_low speed_high",
+    "m_sum_high m_speed_low m_speed_high",
 )
 
 
 def make_layout(
-    n: int, coefficients: int, order: int, lanes: int, *, drag: bool = False, curved: bool = False
+    n: int,
+    coefficients: int,
+    order: int,
+    lanes: int,
+    *,
+    drag: bool = False,
+    curved: bool = False,
+    tabled: bool = False,
 ) -> Layout:
-    """Lay out the rows for ``n`` pendulums, that many clutch coefficients, series of that order, and that many lanes;
-    ``drag``: for torques that depend on speeds too; ``curved``: for a load that is no polynomial of the speed besides.
+    """Lay out the rows for ``n`` pendulums, that many clutch coefficients, series of that order, and that many lanes.
+
+    ``drag``: for torques that depend on speeds too; ``curved``: for a load that is no polynomial of the speed besides;
+    ``tabled``: for one that is a table over it, and for all of these.
     """
     sizes = dict.fromkeys(("speed", "p_speed", "p_torque"), order + 1)
-    sizes["curve"] = order + 1 if curved else 1
+    sizes["curve"] = order + 1 if curved or tabled else 1
+    sizes |= dict.fromkeys(("table_speed", "table_torque"), MAX_LOAD_ROWS if tabled else 1)
     sizes |= {"p_drive": order, "p_law": coefficients, "p_force": coefficients}
     names = Layout._fields[Layout._fields.index("stride") + 1 :]
     fields: dict[str, int] = {}
@@ -267,7 +290,7 @@ def make_layout(
         else:
             fields[name] = shaft_rows
             shaft_rows += sizes.get(name, 1)
-    terms = int(drag or curved), int(curved)
+    terms = int(drag or curved or tabled), int(curved or tabled), int(tabled)
     return Layout(n, coefficients, *terms, order, lanes, shaft_rows + n * stride, shaft_rows, stride, **fields)
 
 

@@ -234,6 +234,8 @@ def _shared_acceleration(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, siz
         push -= _resistance(W[lay.linear, lane], W[lay.quadratic, lane], speed, speed * speed)
     if lay.curved == 1:
         push -= _falling(W, lay, lane) + W[lay.cyclic, lane] * cosine(W[lay.cycle, lane])
+    if lay.tabled == 1:
+        push -= W[lay.level, lane] + W[lay.slope, lane] * W[lay.speed, lane]
     for j in range(lay.n):
         base = lay.pendulums + j * lay.stride
         notes = base + lay.p_m_w_low
@@ -270,6 +272,8 @@ def _shared_jerk(W: Floats, Z: Ints, lay: Layout, lane: int, rate: float) -> Non
         push += W[lay.stribeck_rate, lane] * rate * _falling(W, lay, lane)
         swing = W[lay.cycles, lane] * W[lay.speed, lane]
         push += W[lay.cyclic, lane] * swing * sine(W[lay.cycle, lane])
+    if lay.tabled == 1:
+        push -= W[lay.slope, lane] * rate
     for j in range(lay.n):
         base = lay.pendulums + j * lay.stride
         notes = base + lay.p_m_w_low

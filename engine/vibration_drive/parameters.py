@@ -10,6 +10,8 @@ from sprag_study.sentences import Sentence
 
 MAX_PENDULUMS = 8
 MAX_COEFFICIENTS = 12
+#: Most rows of a load that is given as a table.
+MAX_LOAD_ROWS = 32
 
 
 _INF = math.inf
@@ -20,6 +22,10 @@ START_STATES = frozenset({"initial_windup", "initial_clutch"})
 DRAG = frozenset({"bearing_damping", "linear_load", "quadratic_load", "clutch_damping", "overrunning_damping"})
 #: Loads that are no polynomials of the speed: a drive in which any of them is given needs a kernel that has them too.
 CURVE = frozenset({"stribeck_load", "stribeck_speed", "cyclic_load", "load_cycles", "load_phase"})
+#: Beginning of the paths of the rows of a load that is given as a table over the speed.
+LOAD_TABLE = "shaft.load_table."
+#: Factor of the torques of that table.
+LOAD_FACTOR = "shaft.load_factor"
 #: A load that swings with the angle of the shaft, for runs of a given time only.
 CYCLIC = "shaft.cyclic_load"
 #: A load that falls with the speed, and the speed at which it does.
@@ -29,8 +35,10 @@ RATINGS = frozenset(
     {"rated_torque", "rated_frequency", "rated_speed", "fatigue_exponent"}
     | {"rotor_mass", "bearing_rating", "bearing_exponent", "bearing_share"}
 )
+#: What belongs to a load that is given as a table.
+TABLE = frozenset({"load_factor"})
 #: Parameters that a study has only where they are given: studies from before they existed keep their cases.
-ONLY_GIVEN = START_STATES | DRAG | CURVE | RATINGS
+ONLY_GIVEN = START_STATES | DRAG | CURVE | TABLE | RATINGS
 
 _PARAMETERS = (
     Parameter("gravity", "g", "m/s^2", 0.0, 1e3, False, STANDARD_GRAVITY, "gravitational acceleration"),
@@ -190,6 +198,16 @@ _PARAMETERS = (
     Parameter("shaft.load_cycles", "m", "1", 0.0, 1e3, True, 1.0, "cycles of the cyclic load in a turn of the shaft"),
     Parameter("shaft.load_phase", "psi", "rad", -1e3, 1e3, False, 0.0, "phase of the cyclic load at t = 0"),
     Parameter(
+        LOAD_FACTOR,
+        "k_M",
+        "1",
+        0.0,
+        1e6,
+        False,
+        1.0,
+        "factor of the torques of a load that is given as a table over the speed",
+    ),
+    Parameter(
         "shaft.rotor_mass",
         "m_e",
         "kg",
@@ -269,6 +287,13 @@ def _with_plausible(parameter: Parameter) -> Parameter:
 
 PARAMETERS: tuple[Parameter, ...] = tuple(map(_with_plausible, _PARAMETERS))
 
+#: A row of a load that is given as a table; ``K`` counts from 0, and speeds ascend.
+LOAD_TABLE_SPEED = Parameter(
+    f"{LOAD_TABLE}K.speed", "omega_K", "rad/s", 0.0, 1e6, False, None, "speed of the shaft in a row of its load"
+)
+LOAD_TABLE_TORQUE = Parameter(
+    f"{LOAD_TABLE}K.torque", "M_K", "N*m", 0.0, 1e9, False, None, "load torque in a row of its table over the speed"
+)
 #: Coefficients of the clutch polynomial (docs/theory.md); ``K`` counts from 0, so K = 0 is c_1. Unit N*m/rad^K.
 CLUTCH_COEFFICIENT = Parameter(
     "clutch.coefficients.K", "c_(K+1)", "N*m/rad^K", -1e30, 1e30, False, None, "clutch polynomial"

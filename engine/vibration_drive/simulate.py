@@ -13,12 +13,19 @@ from sprag_study.engine.endings import ENDINGS
 from sprag_study.engine.outcome import Batch, Trajectory
 from sprag_study.engine.run import Run, SettledRun
 from sprag_study.engine.vibration_drive.automaton import Clutch, Shaft
-from sprag_study.engine.vibration_drive.cases import case_matrix, pendulum_count, scalars, unloaded
+from sprag_study.engine.vibration_drive.cases import (
+    case_matrix,
+    has_table,
+    load_table,
+    pendulum_count,
+    scalars,
+    unloaded,
+)
 from sprag_study.engine.vibration_drive.characteristics import characteristics
 from sprag_study.engine.vibration_drive.integration import Integration, integrate
 from sprag_study.engine.vibration_drive.kernel import kernel_of, order_for
 from sprag_study.engine.vibration_drive.layout import OUT_ENDING, PendulumSample, ShaftSample, pendulum_samples
-from sprag_study.engine.vibration_drive.parameters import PARAMETERS
+from sprag_study.engine.vibration_drive.parameters import LOAD_TABLE, PARAMETERS
 
 Floats = NDArray[np.float64]
 
@@ -191,10 +198,32 @@ def _load_torque(value: Mapping[str, float], speed: Floats, angle: Floats) -> Fl
     if value["shaft.cyclic_load"] > 0.0:
         cycle = elementary.cos(value["shaft.load_cycles"] * angle + value["shaft.load_phase"])
         torque = torque + value["shaft.load"] * value["shaft.cyclic_load"] * cycle
+    if has_table(value):
+        speeds, torques = load_table(value, 1)
+        torque = torque + _interpolated(speeds[0], torques[0], speed)
     return torque
 
 
-def warm_up(pendulums: int, coefficients: int, tolerance: float, drag: bool = False, curved: bool = False) -> None:
+def _interpolated(speeds: Floats, torques: Floats, speed: Floats) -> Floats:
+    """Torque in N*m on the straight lines between the rows of a load's table; at its ends that of the row there."""
+    last = int(np.isfinite(speeds).sum()) - 1
+    inside = np.clip(speed, speeds[0], speeds[last])
+    row = np.clip(np.searchsorted(speeds[: last + 1], inside, side="right"), 1, max(last, 1)) - 1
+    following = np.minimum(row + 1, last)
+    width = speeds[following] - speeds[row]
+    slope = np.divide(torques[following] - torques[row], width, out=np.zeros_like(inside), where=width > 0.0)
+    value: Floats = torques[row] + slope * (inside - speeds[row])
+    return value
+
+
+def warm_up(
+    pendulums: int,
+    coefficients: int,
+    tolerance: float,
+    drag: bool = False,
+    curved: bool = False,
+    tabled: bool = False,
+) -> None:
     """Generate and compile the kernel of a shape, and what settles motions, so that others load them from the cache."""
     from sprag_study.engine.vibration_drive.settle import settle
 
@@ -204,6 +233,7 @@ def warm_up(pendulums: int, coefficients: int, tolerance: float, drag: bool = Fa
     columns |= {f"clutch.coefficients.{k}": 1.0 for k in range(max(1, coefficients))}
     columns |= {"shaft.bearing_damping": 1.0} if drag else {}
     columns |= {"shaft.stribeck_load": 1.0} if curved else {}
+    columns |= {f"{LOAD_TABLE}0.speed": 0.0, f"{LOAD_TABLE}0.torque": 1.0} if tabled else {}
     # Nothing moves, which is periodic: this runs all steps of the search, down to the means.
     settle(columns, SettledRun(tolerance=tolerance), cases=1)
     simulate(columns, Run(tolerance=tolerance), cases=1)

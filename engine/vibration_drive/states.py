@@ -9,12 +9,15 @@ from sprag_study.engine.taylor.straight import horner, integral, slope
 from sprag_study.engine.vibration_drive.automaton import CLUTCH_THRESHOLD, Band, Clutch, Shaft, Threshold
 from sprag_study.engine.vibration_drive.formulas import beyond
 from sprag_study.engine.vibration_drive.layout import Layout
+from sprag_study.engine.vibration_drive.parameters import MAX_LOAD_ROWS
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 #: Edge of a band that is not watched.
 NEVER = 1e300
+#: Share of the speed in a row of the load's table by which that is passed when the line of the load changes.
+PASSED = 1e-12
 
 FREE, TAKE_UP, ENGAGED, BEYOND, LOCKED, START = (int(state) for state in Clutch)
 HELD, ROTATING = int(Shaft.HELD), int(Shaft.ROTATING)
@@ -44,6 +47,8 @@ LANE_INTEGERS = 45
 
 NO_EVENT = -2
 OF_SHAFT = -1
+# Targets of events of the shaft beside its states: the lines before and after that of the load's table.
+SLOWER, FASTER = 2, 3
 
 
 _horner, _slope, _integral, _beyond = part(horner), part(slope), part(integral), inlined(beyond)
@@ -176,6 +181,8 @@ def load_at_rest(W: Floats, lay: Layout, lane: int) -> float:
     load = W[lay.load, lane]
     if lay.curved == 1:
         load += W[lay.stribeck, lane] + W[lay.cyclic, lane] * cosine(W[lay.cycle, lane])
+    if lay.tabled == 1:
+        load += W[lay.table_torque, lane]
     return float(load)
 
 
@@ -185,7 +192,35 @@ def is_held(W: Floats, lay: Layout, lane: int) -> bool:
     dry = W[lay.load, lane]
     if lay.curved == 1:
         dry += W[lay.stribeck, lane]
+    if lay.tabled == 1:
+        dry += W[lay.table_torque, lane]
     return bool(dry > 0.0 or (lay.drag == 1 and W[lay.backstop, lane] > 0.0))
+
+
+@part
+def set_piece(W: Floats, Z: Ints, lay: Layout, lane: int, piece: int) -> None:
+    """Put the load of the shaft on the line before row ``piece`` of its table: level, slope, and the speeds at which
+    it is left.
+
+    The torque does not jump at a row, so that it is passed a little later in either direction: a speed that stays there
+    then brings no events without end.
+    """
+    first, last = lay.table_speed + piece - 1, lay.table_speed + piece
+    W[lay.piece, lane] = piece
+    W[lay.slope, lane] = 0.0
+    W[lay.level, lane] = W[lay.table_torque + max(piece - 1, 0), lane]
+    if 0 < piece < MAX_LOAD_ROWS and W[last, lane] < NEVER:
+        before = W[lay.table_torque + piece - 1, lane]
+        slope = (W[lay.table_torque + piece, lane] - before) / (W[last, lane] - W[first, lane])
+        W[lay.slope, lane] = slope
+        W[lay.level, lane] = before - slope * W[first, lane]
+    W[lay.speed_high, lane] = NEVER
+    if Z[lane, SHAFT_STATE] == HELD:
+        return
+    if piece < MAX_LOAD_ROWS and W[last, lane] < NEVER:
+        W[lay.speed_high, lane] = W[last, lane] * (1.0 + PASSED)
+    if piece > 0 and W[first, lane] > 0.0:
+        W[lay.speed_low, lane] = W[first, lane] * (1.0 - PASSED)
 
 
 @part
@@ -197,6 +232,11 @@ def set_shaft(W: Floats, Z: Ints, lay: Layout, lane: int, state: int) -> None:
     W[lay.sum_high, lane] = load if state == HELD else NEVER
     # Torques that depend on speeds vanish at rest: without a dry load and a backstop a shaft stops only in the limit.
     W[lay.speed_low, lane] = 0.0 if state == ROTATING and is_held(W, lay, lane) else -NEVER
+    if lay.tabled == 1:
+        piece = 0
+        while piece < MAX_LOAD_ROWS and W[lay.table_speed + piece, lane] <= W[lay.speed, lane]:
+            piece += 1
+        set_piece(W, Z, lay, lane, piece)
     _set_mobility(W, Z, lay, lane)
 
 

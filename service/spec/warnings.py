@@ -15,7 +15,7 @@ from sprag_study.service.spec.axes.axes import varied_values
 from sprag_study.service.spec.fields import base_pointer
 from sprag_study.service.spec.report import Report
 from sprag_study.worker.derived import distinct_values, involved
-from sprag_study.worker.models import machine_shaft
+from sprag_study.worker.models import LOAD_FACTOR, LOAD_TABLE, machine_shaft
 from sprag_study.worker.models.parameters import parameter_of
 from sprag_study.worker.models.starts import count_of, has_starts
 from sprag_study.worker.study import Axis, Study
@@ -62,6 +62,10 @@ def warn_vibration_drive(report: Report, study: Study) -> None:
     for path, needed in _ONLY_WITH.items():
         if _values(study, path).any() and needed not in study.column_paths and not study.base.get(needed, 0.0):
             report.warn("no-effect", _place(study, path), Sentence("has no effect: {path} is 0", path=needed))
+    if LOAD_FACTOR in (*study.base, *study.column_paths) and f"{LOAD_TABLE}0.speed" not in study.base:
+        report.warn(
+            "no-effect", _place(study, LOAD_FACTOR), Sentence("has no effect: the load is not given as a table")
+        )
     pendulums = sum(path.startswith("pendulums.") and path.endswith(".mass") for path in study.base)
     _upright(report, study, pendulums)
     for index in range(pendulums):

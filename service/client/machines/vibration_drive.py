@@ -75,6 +75,17 @@ class DrivePendulum(TypedDict, total=False):
     clutch: Any
 
 
+class DriveShaftLoadTable(TypedDict, total=False):
+    """Load torque over the speed of the shaft, beside the other loads; at its ends it holds beyond them.
+
+    table : Rows of speed (rad/s) and load torque (N*m), straight lines between them.
+    csv : Speed and load torque as the text of a CSV file, headings with units in brackets.
+    """
+
+    table: Sequence[Sequence[Quantity]]
+    csv: str
+
+
 class DriveShaft(TypedDict, total=False):
     """Fields of shaft.
 
@@ -93,6 +104,7 @@ class DriveShaft(TypedDict, total=False):
         in runs of a given time (kappa); >= 0 and <= 1.
     load_cycles : Cycles of the cyclic load in a turn of the shaft (m); > 0 and <= 1000.
     load_phase : Phase of the cyclic load at t = 0 (psi), rad; >= -1000 rad and <= 1000 rad.
+    load_factor : Factor of the torques of a load that is given as a table over the speed (k_M); >= 0 and <= 1e+06.
     rotor_mass : Mass of the shaft and of what is fixed to it, centred on its axis, for the forces on table and bearings
         (m_e), kg; >= 0 kg and <= 1e+06 kg.
     bearing_rating : Basic dynamic radial load rating of the bearing that carries most, for its life (C), N; > 0 N and
@@ -101,6 +113,8 @@ class DriveShaft(TypedDict, total=False):
         <= 10.
     bearing_share : Part of the load of all bearings that the bearing carries which carries most (s); > 0 and <= 1.
     initial_speed : Shaft speed at t = 0 (phi_e'(0)), rad/s; >= 0 rad/s and <= 1e+06 rad/s.
+    load_table : Load torque over the speed of the shaft, beside the other loads; at its ends it holds beyond them;
+        fields table, csv.
     """
 
     inertia: Quantity
@@ -113,11 +127,13 @@ class DriveShaft(TypedDict, total=False):
     cyclic_load: Quantity
     load_cycles: Quantity
     load_phase: Quantity
+    load_factor: Quantity
     rotor_mass: Quantity
     bearing_rating: Quantity
     bearing_exponent: Quantity
     bearing_share: Quantity
     initial_speed: Quantity
+    load_table: DriveShaftLoadTable
 
 
 class DriveStart(TypedDict, total=False):
@@ -199,6 +215,7 @@ class Drive(Studies):
         "shaft.cyclic_load",
         "shaft.load_cycles",
         "shaft.load_phase",
+        "shaft.load_factor",
         "shaft.rotor_mass",
         "shaft.bearing_rating",
         "shaft.bearing_exponent",
@@ -233,8 +250,8 @@ class Drive(Studies):
             initial_clutch, clutch; needed: inertia, mass, arm.
         shaft : values
             Fields inertia, load, bearing_damping, linear_load, quadratic_load, stribeck_load, stribeck_speed,
-            cyclic_load, load_cycles, load_phase, rotor_mass, bearing_rating, bearing_exponent, bearing_share,
-            initial_speed; needed: inertia.
+            cyclic_load, load_cycles, load_phase, load_factor, rotor_mass, bearing_rating, bearing_exponent,
+            bearing_share, initial_speed, load_table; needed: inertia.
         gravity : number or text with a unit, optional
             Gravitational acceleration (g), m/s^2; >= 0 m/s^2 and <= 1000 m/s^2.
         clutch : values, optional

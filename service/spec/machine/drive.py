@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
-from sprag_study.sentences import Sentence
+from sprag_study.sentences import Amount, Sentence, plural
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.texts import did_you_mean
 from sprag_study.service.spec.described import Field, Listed, Record
 from sprag_study.service.spec.machine.clutch import CLUTCH, Clutch, read_clutch
 from sprag_study.service.spec.machine.machine import Machine
+from sprag_study.service.spec.machine.shaft_tables import read_csv_rows
 from sprag_study.service.spec.node import Node
-from sprag_study.service.spec.schema.quantity import required_of
+from sprag_study.service.spec.schema.quantity import QUANTITY, required_of
 from sprag_study.worker.models import (
+    LOAD_FACTOR,
+    LOAD_TABLE,
+    LOAD_TABLE_SPEED,
+    LOAD_TABLE_TORQUE,
     MAX_COEFFICIENTS,
+    MAX_LOAD_ROWS,
     MAX_PENDULUMS,
     ONLY_GIVEN,
     VIBRATION_DRIVE,
@@ -31,6 +38,8 @@ if TYPE_CHECKING:
 #: Field of the base that a service replaces by the initial values that go on from the end of a case.
 START: Final = "start"
 _PENDULUMS: Final = "pendulums"
+_SHAFT: Final = "shaft"
+_LOAD_FIELD: Final = "load_table"
 #: A start from the end of a case of a study of the same service.
 START_AT: Final = Record(
     {
@@ -41,14 +50,32 @@ START_AT: Final = Record(
     "begin in the state in which a case of another study ends; the service replaces it by initial values",
     required=("study", "case"),
 )
+_ROWS: Final = Listed(
+    "rows", 2, MAX_LOAD_ROWS, "rows of speed (rad/s) and load torque (N*m), straight lines between them",
+    item={"type": "array", "minItems": 2, "maxItems": 2, "items": QUANTITY},
+)  # fmt: skip
+#: A load over the speed of the shaft.
+LOAD: Final = Record(
+    {
+        "table": _ROWS,
+        "csv": {
+            "type": "string",
+            "description": "speed and load torque as the text of a CSV file, headings with units in brackets",
+        },
+    },
+    "load torque over the speed of the shaft, beside the other loads; at its ends it holds beyond them",
+    either=("table", "csv"),
+)
 _WHERE_STARTS = "submission to that service, or `sprag run --db` with its database"
 _PENDULUM_PATH = re.compile(r"pendulums\.([0-9]{1,9})\.(.+)")
 _CLUTCH_PATH = re.compile(r"(?:pendulums\.[0-9]{1,9}\.)?clutch\.(.+)")
 
 
 def _catalogue() -> list[Parameter]:
-    """The parameters of a drive without those of its clutch."""
-    return [entry for entry in parameter_catalogue(VIBRATION_DRIVE) if not entry.path.startswith("clutch.")]
+    """The parameters of a drive without those of its clutch, and of the table of its load."""
+    return [
+        entry for entry in parameter_catalogue(VIBRATION_DRIVE) if not entry.path.startswith(("clutch.", LOAD_TABLE))
+    ]
 
 
 def drive_record() -> Record:
@@ -61,7 +88,8 @@ def drive_record() -> Record:
         needed = required_of(entries)
         required += [name] if needed else []
         clutch: dict[str, Field] = {"clutch": CLUTCH} if name == _PENDULUMS else {}
-        record = Record({**entries, **clutch}, required=needed)
+        table: dict[str, Field] = {_LOAD_FIELD: LOAD} if name == _SHAFT else {}
+        record = Record({**entries, **clutch, **table}, required=needed)
         fields[name] = Listed("pendulums", 1, MAX_PENDULUMS, item=record) if clutch else entries.get(name, record)
     whole = {**fields, "clutch": CLUTCH, START: START_AT}
     return Record(whole, "the machine that every case begins from", required)
@@ -97,6 +125,8 @@ class Drive(Machine):
                 "there is no pendulum {number}: pendulums are numbered from 0 to {last}",
                 number=inside[1], last=str(self.pendulums - 1),
             )  # fmt: skip
+        if path.startswith(LOAD_TABLE.removesuffix(".")):
+            return Sentence("a load that is given as a table is not varied row by row: vary {path}", path=LOAD_FACTOR)
         clutch_path = _CLUTCH_PATH.fullmatch(path)
         if clutch_path:
             return self._why_not_clutch(path, clutch_path[1])
@@ -140,6 +170,8 @@ def read_drive(base: Node) -> Drive:
             _read_pendulums(base[name], section, machine)
         elif isinstance(section, Record) and name != START:
             _read_section(base[name], section, name, machine)
+            if name == _SHAFT:
+                _read_load(base[name][_LOAD_FIELD], machine)
         elif isinstance(section, Parameter):
             number = base[name].otherwise(section.default).number(section)
             machine.values.update({} if number is None else {name: number})
@@ -168,6 +200,30 @@ def _read_section(node: Node, section: Record, prefix: str, machine: Drive) -> N
         if name == "initial_clutch" and not number.is_integer():
             node[name].refuse("invalid-choice", "is not the number of a state", allowed=entry.help)
         machine.values[entry.path] = number
+
+
+def _read_load(node: Node, machine: Drive) -> None:
+    """Read the table of the load, placed under ``LOAD_TABLE``."""
+    form = node.one_of(LOAD.either) if node.given and LOAD.read(node) else None
+    if form is None:
+        return
+    own, columns = node[form], (LOAD_TABLE_SPEED, LOAD_TABLE_TORQUE)
+    named = [replace(entry, path=entry.path.rpartition(".")[2]) for entry in columns]
+    rows = read_csv_rows(own, *named) if form == "csv" else _ROWS.read_rows(own, *named)
+    if not own.sound:
+        return
+    if len(rows) > MAX_LOAD_ROWS:
+        message = plural("has {count} row", "has {count} rows", len(rows))
+        allowed = Sentence("at most {high} rows", high=MAX_LOAD_ROWS)
+        own.refuse("too-many", message, None, allowed=allowed)
+    for k, ((before, _), (speed, _)) in enumerate(pairwise(rows), start=1):
+        if not speed > before:
+            message = Sentence("must have ascending speeds: row {row} does not follow the one before", row=k + 1)
+            value, least = Amount(speed, "rad/s"), Sentence("more than {low}", low=Amount(before, "rad/s"))
+            own.refuse("invalid-table", message, str(value), allowed=least)
+            return
+    for k, row in enumerate(rows):
+        machine.values.update({f"{LOAD_TABLE}{k}.{entry.path}": v for entry, v in zip(named, row, strict=True)})
 
 
 def _read_pendulums(node: Node, listed: Listed, machine: Drive) -> None:

@@ -32,8 +32,19 @@ class Automaton(Machine):
         if self.shaft_state == "held":
             if self.is_pushed():
                 yield lambda t, y: self.holds(y) - sum(self.torques(t, y)[0]), lambda y, t: self.turn("rotating")
-        elif self.stops:
-            yield lambda t, y: y[self.shaft], self.stop
+        else:
+            if self.row < len(self.table):
+                yield (
+                    lambda t, y, at=self.table[self.row][0]: at - y[self.shaft],
+                    lambda y, t: self.pass_row(y, self.row, 1),
+                )
+            if self.row > 0 and self.table[self.row - 1][0] > 0.0:
+                yield (
+                    lambda t, y, at=self.table[self.row - 1][0]: y[self.shaft] - at,
+                    lambda y, t: self.pass_row(y, self.row - 1, -1),
+                )
+            elif self.stops:
+                yield lambda t, y: y[self.shaft], self.stop
         for i, p in enumerate(self.pendulums):
             state = self.clutches[i]
 
@@ -80,11 +91,18 @@ class Automaton(Machine):
         """Whether any clutch may drive the shaft: one that overruns or takes up its backlash never does."""
         return any(state not in ("free", "take_up") for state in self.clutches)
 
+    def pass_row(self, y: Floats, row: int, further: int) -> None:
+        """The line of the load's table changes; no transition."""
+        y[self.shaft] = self.table[row][0]
+        self.row += further
+        self.out.events -= 1
+
     def turn(self, state: str) -> None:
         self.shaft_state = state
 
     def stop(self, y: Floats, t: float) -> None:
         y[self.shaft] = 0.0
+        self.row = self.row_at(0.0)
         for i in range(self.n):
             if self.clutches[i] == "locked":
                 y[self.n + i] = 0.0

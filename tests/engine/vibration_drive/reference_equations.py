@@ -83,6 +83,8 @@ class Machine:
             get(f"shaft.{name}") for name in ("bearing_damping", "linear_load", "quadratic_load")
         )
         self.stribeck, self.stribeck_speed = get("shaft.stribeck_load"), get("shaft.stribeck_speed", 1.0)
+        rows = sorted({path.split(".")[2] for path in columns if path.startswith("shaft.load_table.")}, key=int)
+        self.table = [(get(f"shaft.load_table.{k}.speed"), get(f"shaft.load_table.{k}.torque")) for k in rows]
         self.swing, self.cycles, self.phase = (
             get(f"shaft.{name}", default)
             for name, default in (("cyclic_load", 0.0), ("load_cycles", 1.0), ("load_phase", 0.0))
@@ -114,7 +116,8 @@ class Machine:
         self.start[self.shaft] = get("shaft.initial_speed")
         self.clutches = ["free"] * n
         self.backstop = any(p.overrunning_damping > 0.0 for p in self.pendulums)
-        self.stops = self.load > 0.0 or self.stribeck > 0.0 or self.backstop
+        self.row = self.row_at(float(self.start[self.shaft]))
+        self.stops = self.load > 0.0 or self.stribeck > 0.0 or self.backstop or (self.table and self.table[0][1] > 0.0)
         self.shaft_state = "rotating" if self.start[self.shaft] > 0.0 or not self.stops else "held"
 
     def base(self, t: Any) -> tuple[Any, Any]:
@@ -134,7 +137,20 @@ class Machine:
         """Torque of the load at a speed and an angle of the shaft; at rest, what it holds."""
         bent = self.stribeck * np.exp(-speed / self.stribeck_speed)
         bent = bent + self.load * self.swing * np.cos(self.cycles * angle + self.phase)
-        return self.load + self.linear * speed + self.quadratic * speed * np.abs(speed) + bent
+        return self.load + self.linear * speed + self.quadratic * speed * np.abs(speed) + bent + self.on_line(speed)
+
+    def row_at(self, speed: float) -> int:
+        """The row of the load's table before which a speed is."""
+        return sum(speed >= at for at, _ in self.table)
+
+    def on_line(self, speed: Any) -> Any:
+        """Torque on the line before the present row of the load's table, which holds beyond the ends of the table."""
+        if not self.table:
+            return 0.0 * speed
+        if not 0 < self.row < len(self.table):
+            return self.table[min(self.row, len(self.table) - 1)][1] + 0.0 * speed
+        (low, first), (high, second) = self.table[self.row - 1 : self.row + 1]
+        return first + (second - first) * (speed - low) / (high - low)
 
     def rate(self, i: int) -> float:
         """Damping of a clutch in its state."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -39,6 +40,33 @@ def bent(pendulums: int, seed: int, cases: int) -> list[Columns]:
                 "shaft.load_phase": draw.uniform(-7.0, 7.0),
             }
     return machines
+
+
+def table(*rows: tuple[float, float]) -> Columns:
+    """A load that is given as a table over the speed."""
+    named = [{"speed": speed, "torque": torque} for speed, torque in rows]
+    return {f"shaft.load_table.{k}.{name}": value for k, row in enumerate(named) for name, value in row.items()}
+
+
+def tabled(pendulums: int, seed: int, cases: int) -> list[Columns]:
+    """Random machines whose loads are tables over the speed, beside other loads or alone."""
+    draw = np.random.default_rng(seed)
+    machines = damped(pendulums, seed, cases)
+    for number, columns in enumerate(machines):
+        speeds = np.sort(draw.uniform(0.0, 40.0, draw.integers(1, 7)))
+        speeds[0] *= draw.choice([0.0, 1.0])
+        torques = draw.uniform(0.0, 0.3, speeds.size) * draw.choice([1.0, 1.0, 0.0], speeds.size)
+        columns.update(table(*zip(speeds.tolist(), torques.tolist(), strict=True)))
+        if (seed + number) % 3 == 0:
+            columns |= {"shaft.stribeck_load": 0.1, "shaft.stribeck_speed": 2.0}
+    return machines
+
+
+@pytest.mark.parametrize("number", range(10))
+def test_an_independent_integrator_agrees_on_tables(number: int) -> None:
+    (columns,) = tabled(1, 500 + number, 1)
+    if not compare(columns, "literal" if number % 6 == 5 else "contact", 1e-9):
+        pytest.skip("too sensitive to conclude anything")
 
 
 @pytest.mark.parametrize("number", range(18))
@@ -119,6 +147,51 @@ def test_a_load_that_acts_at_the_end_of_a_run_down_only(scale: float) -> None:
     columns = running_down(**{"shaft.load": dry, "shaft.stribeck_load": torque, "shaft.stribeck_speed": scale})
     row = one(columns, Run(duration=Span(1.5 * stop, "s"), window=(Span(0.0, "s"), Span(1.5 * stop, "s"))))
     assert 1.5 * (1.0 - row["fraction.held"]) == pytest.approx(1.0, rel=1e-10)
+
+
+def test_run_down_along_a_table() -> None:
+    """On a line t_1 + s (omega - omega_1) the shaft takes (J/s) ln(T_0/T) from torque T_0 to T, and J/T a speed where
+    the torque is constant; the torque at the ends of the table holds beyond them.
+    """
+    rows = ((5.0, 0.02), (10.0, 0.05), (20.0, 0.01))
+    columns = running_down(**table(*rows))
+    lasts = [J_E / 0.01 * 10.0]  # from 30 to 20 rad/s
+    for (low, first), (high, second) in itertools.pairwise(rows):
+        lasts.append(J_E * (high - low) / (second - first) * math.log(second / first))
+    lasts.append(J_E / 0.02 * 5.0)
+    stop = sum(lasts)
+    row = one(columns, Run(duration=Span(1.5 * stop, "s"), window=(Span(0.0, "s"), Span(1.5 * stop, "s"))))
+    assert 1.5 * (1.0 - row["fraction.held"]) == pytest.approx(1.0, rel=1e-11)
+    assert row["power.useful.mean"] * 1.5 * stop == pytest.approx(0.5 * J_E * 900.0, rel=1e-11)
+    # (0.09 - 0.004 omega) omega, on the line that falls, is largest within it.
+    assert row["power.useful.max"] == pytest.approx(0.09**2 / (4.0 * 0.004), rel=1e-11)
+    assert row["run.events"] == 1.0  # it stops
+    path = trajectory(columns, Run(duration=Span(1.5 * stop, "s")), np.linspace(0.0, 1.5 * stop, 101))
+    speed = column(path, "shaft.speed")
+    np.testing.assert_allclose(
+        column(path, "power.useful"), speed * np.interp(speed, *zip(*rows, strict=True)), rtol=1e-12, atol=1e-15
+    )
+
+
+def test_tables_are_the_lines_that_they_are_on() -> None:
+    """A table of a constant, and one of a line, are the loads that have terms of their own."""
+    constant, line = (
+        table(*((speed, torque(speed)) for speed in (0.0, 5.0, 7.0, 300.0)))
+        for torque in (lambda speed: 0.2, lambda speed: 0.1 + 0.02 * speed)
+    )
+    cases = [drive(1, shaft__load=0.05) | constant | {"shaft.load_factor": 0.5},
+             drive(1, shaft__load=0.0) | line | {"shaft.load_factor": 1.0}]  # fmt: skip
+    same = [drive(1, shaft__load=0.15), drive(1, shaft__load=0.1, shaft__linear_load=0.02)]
+    run = periods(30.0, 15.0, 30.0)
+    for given, meant in zip(cases, same, strict=True):
+        row, other = one(given, run), one(meant, run)
+        for name in ("shaft.speed.mean", "power.useful.mean", "torque.max", "power.useful.max", "efficiency"):
+            assert row[name] == pytest.approx(other[name], rel=1e-9), name
+        assert max(row["balance.energy"], row["balance.momentum"]) < 1e-10
+    settled = settle(batch_of(cases), SettledRun(), cases=2)
+    plain = settle(batch_of([{"shaft.linear_load": 0.0} | case for case in same]), SettledRun(), cases=2)
+    assert settled.regimes.tolist() == plain.regimes.tolist() == [Regime.PERIODIC] * 2
+    np.testing.assert_allclose(settled.values[:, 0], plain.values[:, 0], rtol=1e-8)
 
 
 def test_run_down_against_a_cyclic_load() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from sprag_study.engine.vibration_drive.parameters import MAX_COEFFICIENTS, MAX_PENDULUMS
+from sprag_study.engine.vibration_drive.parameters import MAX_COEFFICIENTS, MAX_LOAD_ROWS, MAX_PENDULUMS
 from sprag_study.worker.models.form import Block, ComponentKind, Form, FormChoice, FormField, Option, Rows
 
 _CLUTCH: Final = FormChoice(
@@ -51,6 +51,14 @@ _WHOSE: Final = FormChoice(
 #: What the maker of a clutch says of it.
 _RATINGS: Final = ("rated_torque", "rated_frequency", "rated_speed", "fatigue_exponent")
 
+#: A load that is given as a table.
+_LOAD: Final = FormField(
+    "shaft/load_table/csv", "table", "Load as a table over the speed",
+    f"two columns with headings and units, pasted from a spreadsheet; 2 to {MAX_LOAD_ROWS} rows with ascending speeds, "
+    "straight lines between them; the load at the ends holds beyond them",
+    example="speed [rpm],torque [N*m]\n0,0.05\n200,0.2", lines=5, columns=("speed", "torque"),
+)  # fmt: skip
+
 FORM: Final = Form(
     parts=(
         Block("Vibration of the base", (FormField("excitation/*"),)),
@@ -63,7 +71,7 @@ FORM: Final = Form(
             only_last=True, shared=("clutches", "clutch"), every="every pendulum", one="pendulum {number}",
         ),
         Block("Freewheel clutch", (_WHOSE,)),
-        Block("Output shaft", (FormField("shaft/*"),)),
+        Block("Output shaft", (FormField("shaft/*"), _LOAD)),
         Block("Surroundings", (FormField("*"),)),
     ),
     components=(

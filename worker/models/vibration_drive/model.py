@@ -12,13 +12,16 @@ import numpy as np
 
 from sprag_study.engine import Ending, Run, Span
 from sprag_study.engine.catalogue import ResultInfo
-from sprag_study.engine.vibration_drive.cases import has_curve, has_drag
+from sprag_study.engine.vibration_drive.cases import has_curve, has_drag, has_table
 from sprag_study.engine.vibration_drive.clutch import ClutchLawError, check_law
 from sprag_study.engine.vibration_drive.load_results import load_infos
 from sprag_study.engine.vibration_drive.parameters import (
     CLUTCH_COEFFICIENT,
     CLUTCH_WINDUP_LIMIT,
     CYCLIC,
+    LOAD_TABLE,
+    LOAD_TABLE_SPEED,
+    LOAD_TABLE_TORQUE,
     MAX_PENDULUMS,
     PARAMETERS,
 )
@@ -124,21 +127,27 @@ _DRAG_OF_IT: Final = {"shaft.bearing_damping": 1e-3, "shaft.quadratic_load": 1e-
 _CURVE_OF_IT: Final = {
     "shaft.stribeck_load": 0.1, "shaft.stribeck_speed": 2.0, "shaft.cyclic_load": 0.5, "shaft.load_cycles": 8.0,
 }  # fmt: skip
+_TABLE_OF_IT: Final = {
+    f"{LOAD_TABLE}{k}.{name}": value
+    for k, row in enumerate(((0.0, 0.1), (5.0, 0.05), (12.0, 0.2)))
+    for name, value in zip(("speed", "torque"), row, strict=True)
+}
 _DRAG_OF_CLUTCHES: Final = {"clutch_damping": 0.05, "overrunning_damping": 1e-4}
 
 _PENDULUM = re.compile(r"pendulums\.(\d+)\.")
 _COEFFICIENT = re.compile(r"(?:^|\.)clutch\.coefficients\.(\d+)$")
 
 
-#: Last part of the key of a kernel with torques that depend on speeds, and of one with loads that are no polynomials of
-#: them too.
+#: Last part of the key of a kernel with torques that depend on speeds, of one with loads that are no polynomials of
+#: them too, and of one with loads that are tables over them besides.
 _DRAG: Final = "drag"
 _CURVE: Final = "curve"
+_TABLE: Final = "table"
 
 
 class DriveKey(NamedTuple):
     """Key of the kernel of a vibration drive; ``drag``: with torques that depend on speeds, ``curved``: with loads that
-    are no polynomials of the speed too.
+    are no polynomials of the speed too, ``tabled``: with loads that are tables over it besides.
     """
 
     pendulums: int
@@ -146,11 +155,12 @@ class DriveKey(NamedTuple):
     tolerance: float
     drag: bool = False
     curved: bool = False
+    tabled: bool = False
 
     @property
     def shape(self) -> KernelShape:
         """The shape with this key."""
-        terms = (_CURVE,) if self.curved else (_DRAG,) if self.drag else ()
+        terms = (_TABLE,) if self.tabled else (_CURVE,) if self.curved else (_DRAG,) if self.drag else ()
         return KernelShape(MODEL, (*self[:3], *terms))
 
 
@@ -264,7 +274,7 @@ class VibrationDrive(Model):
     presentation = PRESENTATION
 
     def parameters(self) -> tuple[Parameter, ...]:
-        return (*PARAMETERS, CLUTCH_COEFFICIENT, CLUTCH_WINDUP_LIMIT)
+        return (*PARAMETERS, LOAD_TABLE_SPEED, LOAD_TABLE_TORQUE, CLUTCH_COEFFICIENT, CLUTCH_WINDUP_LIMIT)
 
     def variants(self) -> tuple[str, ...]:
         return tuple(
@@ -294,8 +304,10 @@ class VibrationDrive(Model):
         return tuple(replace(info, name=info.name.replace(one, "pendulums.N.")) for info in infos)
 
     def shape_of(self, study: Study) -> KernelShape:
-        drag, curved = has_drag(_paths(study)), has_curve(_paths(study))
-        return DriveKey(pendulums(study), coefficients(study), run_of(study.run).tolerance, drag, curved).shape
+        terms = {
+            "drag": has_drag(_paths(study)), "curved": has_curve(_paths(study)), "tabled": has_table(_paths(study)),
+        }  # fmt: skip
+        return DriveKey(pendulums(study), coefficients(study), run_of(study.run).tolerance, **terms).shape
 
     def sweeps(self, run: Mapping[str, Any]) -> bool:
         return is_settled(run) and not has_starts(run)
@@ -387,8 +399,9 @@ class VibrationDrive(Model):
     def known_answers(self, shape: KernelShape) -> bytes:
         from sprag_study.engine.vibration_drive.simulate import simulate
 
-        pendulums, coefficients, tolerance, drag, curved = _key_of(shape)
+        pendulums, coefficients, tolerance, drag, curved, tabled = _key_of(shape)
         columns = _DRIVEN | (_DRAG_OF_IT if drag else {}) | (_CURVE_OF_IT if curved else {})
+        columns |= _TABLE_OF_IT if tabled else {}
         swinging = _PENDULUM_OF_IT | (_DRAG_OF_CLUTCHES if drag else {})
         for number in range(pendulums):
             columns |= {f"pendulums.{number}.{name}": value for name, value in swinging.items()}
@@ -507,4 +520,5 @@ def _is_law(law: NDArray[np.float64]) -> bool:
 def _key_of(shape: KernelShape) -> DriveKey:
     terms = shape.key[3:]
     numbers = cast("tuple[int, int, float]", shape.key[:3])
-    return DriveKey(*numbers, drag=terms in {(_DRAG,), (_CURVE,)}, curved=terms == (_CURVE,))
+    curved = terms in {(_CURVE,), (_TABLE,)}
+    return DriveKey(*numbers, drag=curved or terms == (_DRAG,), curved=curved, tabled=terms == (_TABLE,))

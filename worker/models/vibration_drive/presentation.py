@@ -50,7 +50,7 @@ def _phases(names: Sequence[str]) -> tuple[tuple[str, str, str], ...]:
 
 _LOADS: Final = (
     *("bearing_damping", "linear_load", "quadratic_load", "stribeck_load", "stribeck_speed"),
-    *("cyclic_load", "load_cycles", "load_phase"),
+    *("cyclic_load", "load_cycles", "load_phase", "load_factor"),
 )
 _POINT: Final = ("excitation.frequency", "excitation.amplitude_x", "excitation.amplitude_y", "shaft.load")
 

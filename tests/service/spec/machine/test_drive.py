@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 import re
 from typing import Any
 
@@ -10,7 +11,15 @@ import pytest
 
 from sprag_study.engine.vibration_drive.parameters import CURVE, DRAG
 from sprag_study.worker.limits import MAX_CLUTCH_ROWS
-from sprag_study.worker.models import MAX_COEFFICIENTS, MAX_PENDULUMS, ONLY_GIVEN, parameter_catalogue, shape_of
+from sprag_study.worker.models import (
+    LOAD_TABLE,
+    MAX_COEFFICIENTS,
+    MAX_LOAD_ROWS,
+    MAX_PENDULUMS,
+    ONLY_GIVEN,
+    parameter_catalogue,
+    shape_of,
+)
 from tests.service.spec_sample import SPEC, parsed, problems
 
 PENDULUM = SPEC["base"]["pendulums"][0]
@@ -24,7 +33,11 @@ def pendulums(*changes: dict[str, Any]) -> list[dict[str, Any]]:
     return [copy.deepcopy(PENDULUM) | change for change in changes]
 
 
-@pytest.mark.parametrize("entry", parameter_catalogue("vibration-drive"), ids=lambda entry: entry.path)
+@pytest.mark.parametrize(
+    "entry",
+    [entry for entry in parameter_catalogue("vibration-drive") if not entry.path.startswith(LOAD_TABLE)],
+    ids=lambda entry: entry.path,
+)
 def test_every_parameter_keeps_its_range(entry: Any) -> None:
     pointer = "/base/" + entry.path.replace(".N.", ".0.").replace(".K", ".1").replace(".", "/")
     unit = entry.unit.replace("^K", "")
@@ -43,7 +56,7 @@ def test_every_parameter_keeps_its_range(entry: Any) -> None:
     [
         entry
         for entry in parameter_catalogue("vibration-drive")
-        if not re.search("clutch|windup", entry.path) and entry.path.rpartition(".")[2] not in ONLY_GIVEN
+        if not re.search("clutch|windup|load_table", entry.path) and entry.path.rpartition(".")[2] not in ONLY_GIVEN
     ],
     ids=lambda entry: entry.path,
 )
@@ -273,6 +286,53 @@ def test_a_stribeck_load_needs_the_speed_at_which_it_falls() -> None:
         parsed({"/base/shaft/stribeck_speed": 2, **change})
     parsed({"/base/shaft/stribeck_load": 0})
     parsed({"/base/shaft/stribeck_load": 0.2, "/axes/2": {"path": "shaft.stribeck_speed", "values": [1, 2]}})
+
+
+TABLE = "/base/shaft/load_table"
+
+
+def test_a_load_is_a_table_over_the_speed() -> None:
+    rows = [["0 rpm", "100 N*mm"], ["60 rpm", "50 N*mm"]]
+    csv = "speed [rpm];torque [N*mm]\n0;100\n60;50\n"
+    studies = [parsed({TABLE: table, "/axes": []}).study for table in ({"table": rows}, {"csv": csv})]
+    assert studies[0].base == studies[1].base
+    values = {path: value for path, value in studies[0].base.items() if path.startswith(LOAD_TABLE)}
+    assert values == pytest.approx({
+        "shaft.load_table.0.speed": 0.0, "shaft.load_table.0.torque": 0.1,
+        "shaft.load_table.1.speed": 2.0 * math.pi, "shaft.load_table.1.torque": 0.05,
+    })  # fmt: skip
+    without = parsed({"/axes": []}).study
+    assert studies[0].base.items() - without.base.items() == values.items()
+    assert shape_of(studies[0]) != shape_of(without)
+    factors = {"/axes/2": {"path": "shaft.load_factor", "values": [0, 0.5, 1]}}
+    (warning,) = parsed(factors).warnings
+    assert "not given as a table" in warning
+    assert parsed({**factors, TABLE: {"csv": csv}}).warnings == ()
+
+
+@pytest.mark.parametrize(
+    ("table", "pointer", "code"),
+    [
+        ({"table": [[0, 0.1], [2, 0.1], [2, 0.2]]}, f"{TABLE}/table", "invalid-table"),
+        ({"csv": "speed [rpm],torque [N*m]\n10,0.1\n5,0.2\n"}, f"{TABLE}/csv", "invalid-table"),
+        ({"table": [[0, 0.1]]}, f"{TABLE}/table", "wrong-type"),
+        ({"table": [[k, 0.1] for k in range(MAX_LOAD_ROWS + 1)]}, f"{TABLE}/table", "wrong-type"),
+        ({"csv": "speed,torque\n" + "".join(f"{k},0.1\n" for k in range(MAX_LOAD_ROWS + 1))}, f"{TABLE}/csv",
+         "too-many"),
+        ({"table": [[0, -0.1], [2, 0.1]]}, f"{TABLE}/table/0/1", "out-of-range"),
+        ({"table": [[-1, 0.1], [2, 0.1]]}, f"{TABLE}/table/0/0", "out-of-range"),
+        ({"table": [[0, 0.1], [2, 0.1]], "csv": ""}, TABLE, "exactly-one"),
+        ({}, TABLE, "exactly-one"),
+    ],
+)  # fmt: skip
+def test_what_is_no_table_of_a_load(table: object, pointer: str, code: str) -> None:
+    assert {where: fault.code for where, fault in problems({TABLE: table}).items()} == {pointer: code}
+
+
+def test_rows_of_a_load_are_not_varied() -> None:
+    table = {TABLE: {"table": [[0, 0.1], [2, 0.1]]}}
+    axis = {"/axes/2": {"path": "shaft.load_table.1.torque", "values": [0.1, 0.2]}}
+    assert "shaft.load_factor" in problems(table | axis)["/axes/2/path"].message
 
 
 def test_units_of_a_load_that_rises_with_the_speed() -> None:
