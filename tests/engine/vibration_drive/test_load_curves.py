@@ -62,10 +62,10 @@ def tabled(pendulums: int, seed: int, cases: int) -> list[Columns]:
     return machines
 
 
-@pytest.mark.parametrize("number", range(10))
+@pytest.mark.parametrize("number", range(5))
 def test_an_independent_integrator_agrees_on_tables(number: int) -> None:
     (columns,) = tabled(1, 500 + number, 1)
-    if not compare(columns, "literal" if number % 6 == 5 else "contact", 1e-9):
+    if not compare(columns, "literal" if number == 4 else "contact", 1e-9):
         pytest.skip("too sensitive to conclude anything")
 
 
