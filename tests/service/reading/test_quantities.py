@@ -236,8 +236,8 @@ def test_every_parameter_and_result_has_a_caption_of_its_own() -> None:
         for name, text in captions.items():
             assert not set("._") & set(text), (name, text)
             assert text[0].isupper(), (name, text)
-        results = [captions[info.name.replace(".N", ".0").replace(".K", ".0")] for info in models.result_catalogue(model)]
-        assert len(results) == len(set(results))
+        results = [info.name.replace(".N", ".0").replace(".K", ".0") for info in models.result_catalogue(model)]
+        assert len(results) == len({captions[name] for name in results})
 
 
 def test_texts_for_units_can_be_typeset() -> None:
