@@ -28,6 +28,7 @@ TOOLS = ("pytest", "hypothesis", "jsonschema", "openpyxl", "polars", "ruamel.yam
 #: None of them compiles a kernel or starts a browser.
 TESTS = (
     "tests/test_foreign_parts.py",
+    "tests/service/cli/test_completion.py",
     *(
         f"tests/service/http/test_{name}.py"
         for name in ("timeouts", "server", "guard", "drain", "tls", "prefix", "metrics", "fault_connection", "roles")

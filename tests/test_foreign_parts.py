@@ -73,6 +73,14 @@ def test_the_units_of_a_unit() -> None:
     assert dict(root._units.items()) == {"gram": 1, "meter": 2, "second": -2}
 
 
+def test_the_types_of_options() -> None:
+    """Help calls a number N by the type of its option, an attribute that typer 0.29 has no more."""
+    from sprag_study.service.cli.app import command_line
+
+    serve = command_line().commands["serve"]
+    assert {option.name for option in serve.params if option.metavar == "N"} == {"port", "processes"}
+
+
 def _requirements() -> dict[str, Requirement]:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     texts = [*project["dependencies"], *(text for extra in project["optional-dependencies"].values() for text in extra)]

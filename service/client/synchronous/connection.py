@@ -81,6 +81,9 @@ class Connection:
         token = "" if self._open_to_all else None
         return partial(type(self), self.server, token, retry=self.retry, timeout=self._timeout), ()
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.server!r})"
+
     def __copy__(self) -> Self:
         return self
 

@@ -261,6 +261,7 @@ def test_the_token_of_the_environment_does_not_go_to_the_service_of_the_login(
 def test_a_password_in_the_address_is_left_behind(kind: Any) -> None:
     client = kind("https://anna:very-secret@sprag.example:8443/office/")
     assert client.server == "https://sprag.example:8443/office"
+    assert repr(client) == f"{kind.__name__}('https://sprag.example:8443/office')"
     assert client._http.base_url == f"{client.server}/"
     content = pickle.dumps(client)
     assert b"very-secret" not in content
