@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from sprag_study.service.reading.wording import words
-from sprag_study.service.spec.described import ANY_RUN, DURATION, FIT, SETTLED_RUN
+from sprag_study.service.spec.described import ANY_RUN, DURATION, FIT, SETTLED_RUN, SHAFT_RUN
 from sprag_study.service.spec.draws.described import DISTRIBUTION
 from sprag_study.service.spec.kinds.goal import GOAL
 from sprag_study.service.spec.kinds.refine import REFINE
@@ -13,6 +13,7 @@ from sprag_study.service.spec.kinds.tolerances import DRAWS
 from sprag_study.service.spec.machine.shaft import MEAN_SPEED_IS
 from sprag_study.service.spec.machine.shaft_drive import BALANCE, BALANCE_SIDE, FLYWHEEL, MOTOR, STAGE
 from sprag_study.service.spec.machine.shaft_parts import (
+    EFFICIENCY_IS,
     INDICATOR_OVER,
     INTERPOLATION,
     MECHANISM_CHOICES,
@@ -29,9 +30,29 @@ def form_values() -> Iterator[str]:
     """Labels and help of the fields of the form for a new study."""
     yield from (words(name) for name in OPERATION.either)
     machine = (*MECHANISM_CHOICES.values(), OPERATION_CHOICES)
-    drive = (MEAN_SPEED_IS, BALANCE, BALANCE_SIDE, FLYWHEEL, MOTOR, STAGE, INDICATOR_OVER, INTERPOLATION, PHI_C)
+    drive = (
+        EFFICIENCY_IS,
+        MEAN_SPEED_IS,
+        BALANCE,
+        BALANCE_SIDE,
+        FLYWHEEL,
+        MOTOR,
+        STAGE,
+        INDICATOR_OVER,
+        INTERPOLATION,
+        PHI_C,
+    )
     plan = (*GOAL.described.values(), REFINE.listed["results"], *REFINE.described.values())
-    entries = (*SETTLED_RUN.values(), DURATION, *ANY_RUN.values(), *FIT.values(), *DRAWS.values(), *plan, *drive)
+    entries = (
+        *SETTLED_RUN.values(),
+        DURATION,
+        *ANY_RUN.values(),
+        *SHAFT_RUN.values(),
+        *FIT.values(),
+        *DRAWS.values(),
+        *plan,
+        *drive,
+    )
     for entry in (*entries, *(entry for choices in machine for entry in choices.values())):
         name = words(getattr(entry, "name", ""))
         texts = [word if word != value else words(word) for value, word in getattr(entry, "choices", ())]

@@ -115,6 +115,12 @@ def _check_part(part: PartChoice) -> None:
     _check_form(_INERTIA, mechanism.kind, mechanism.table is not None, has_formula)
     if operation.quantity in {"torque", "force", "pressure"}:
         _check_form(Sentence("The operation"), operation.form, operation.table is not None, bool(operation.formula))
+    if operation.efficiency_is == "work" and operation.form == "formula" and operation.quantity in {"torque", "force"}:
+        raise StructureError(
+            Sentence(
+                'An efficiency as share of the work of a cycle (efficiency_is "work") is not possible for a formula.'
+            )
+        )
     if mechanism.kind == "linkage":
         _check_linkage(mechanism.linkage)
     needs = operation.quantity in {"force", "gas", "pressure"} or (

@@ -133,8 +133,22 @@ class Operation:
     @property
     def loses(self) -> bool:
         """Whether less of its power arrives than is sent."""
+        return self._charged and self._choice.efficiency_is == "power"
+
+    @property
+    def _charged(self) -> bool:
         efficiency = self._values.get("efficiency")
         return self._choice.quantity != "none" and efficiency is not None and bool((efficiency != 1.0).any())
+
+    @property
+    def loses_evenly(self) -> bool:
+        """Whether a share of its work in a cycle is lost, as a constant torque."""
+        return self._charged and self._choice.efficiency_is == "work"
+
+    def even_loss(self, mean: Floats) -> Floats:
+        """Torque in N*m that the losses take at every angle, for a ``mean`` torque of the operation over the cycle."""
+        efficiency = self._values["efficiency"]
+        return np.asarray(np.where(mean > 0.0, mean * (1.0 - efficiency), -mean * (1.0 / efficiency - 1.0)))
 
     def switch(self, index: int, phi: Floats, omega: Floats) -> Floats:
         """Value of a switch of a formula that follows the speed, at its own angles and the speeds there."""
@@ -208,13 +222,14 @@ class Operation:
         return total
 
     def torque(self, phi: Floats, way_slope: Floats | None) -> Floats:
-        """Reduced torque M_r of the operation in N*m, negative where it resists, with the losses on its way.
+        """Reduced torque M_r of the operation in N*m, negative where it resists, with the losses of its power.
 
         The parameters are those of ``lossless``.
         """
-        torque, efficiency = self.lossless(phi, way_slope), self._values.get("efficiency")
-        if efficiency is None or (efficiency == 1.0).all():
+        torque = self.lossless(phi, way_slope)
+        if not self.loses:
             return torque
+        efficiency = self._values["efficiency"]
         return np.where(torque > 0.0, torque * efficiency, torque / efficiency)
 
     def lossless(self, phi: Floats, way_slope: Floats | None) -> Floats:

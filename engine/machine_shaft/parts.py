@@ -5,6 +5,7 @@ whole cycle: the mechanism stands at that angle, and the diagram of the operatio
 """
 
 from collections.abc import Mapping
+from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -22,6 +23,7 @@ from sprag_study.engine.machine_shaft.linkages import CrankShaper, ScotchYoke, S
 from sprag_study.engine.machine_shaft.linked_rams import DragLink, Toggle
 from sprag_study.engine.machine_shaft.mechanisms import Mechanism, Motion, RodMechanism, Values
 from sprag_study.engine.machine_shaft.operations import Operation, SpeedLaw, every_revolution, formula_breaks
+from sprag_study.engine.machine_shaft.panels import Panels
 from sprag_study.engine.machine_shaft.pieces import Formula
 from sprag_study.engine.machine_shaft.planar import PlanarLinkage
 from sprag_study.engine.machine_shaft.problems import TableError, amount
@@ -33,6 +35,8 @@ from sprag_study.sentences import Sentence
 Floats = NDArray[np.float64]
 
 _TURN = 2.0 * np.pi
+#: Panels per revolution over which the mean torque of an operation is taken, beside its own cuts.
+_LOSS_PANELS = 64
 
 
 #: Mechanisms without choices of their own.
@@ -176,12 +180,27 @@ class ShaftPart:
     def _environment(self, own: Floats) -> dict[str, tuple[Floats, Floats | float]]:
         return {"phi": (own, np.ones(1)), **{name: (value, 0.0) for name, value in self._constants.items()}}
 
-    def breaks(self) -> list[Floats]:
-        """Angles of the shaft at which inertia or torque has a kink or a jump, (cases or 1, n); NaN is none."""
+    def _torque_breaks(self) -> list[Floats]:
+        """Angles of the part at which its torque has a kink or a jump, (cases or 1, n); NaN is none."""
         breaks = list(self._operation.breaks())
         if self._stroke is not None and self.mechanism is not None:
             own = [self._stroke.start, self._stroke.end, *self.mechanism.breaks(self.values)]
             breaks += [every_revolution(angle, self._revolutions) for angle in own]
+        return breaks
+
+    @cached_property
+    def _even_loss(self) -> Floats:
+        """Torque in N*m that the losses of the operation's work take at every angle, shape (cases, 1, 1)."""
+        count = _LOSS_PANELS * self._revolutions
+        panels = Panels.over(self.cycle, self._torque_breaks(), count, self._operation.given_breaks())
+        motion = None if self.mechanism is None else self.mechanism.motion(self.values, panels.angles)
+        torque = self._operation.lossless(panels.angles, None if motion is None else motion.way_slope)
+        shaped = np.ascontiguousarray(np.broadcast_to(torque, (self.cases, *panels.angles.shape[1:])))
+        return self._operation.even_loss(panels.integral(shaped)[:, None, None] / self.cycle)
+
+    def breaks(self) -> list[Floats]:
+        """Angles of the shaft at which inertia or torque has a kink or a jump, (cases or 1, n); NaN is none."""
+        breaks = self._torque_breaks()
         if self._curve is not None:
             period = float(self._curve.knots[-1] - self._curve.knots[0])
             repeats = round(self.cycle / period)
@@ -272,6 +291,8 @@ class ShaftPart:
             torque = self._operation.speed_law(own, way_slope)(omega)[0]
         else:
             torque = self._operation.torque(own, way_slope)
+            if self._operation.loses_evenly:
+                torque = torque - self._even_loss
         return PartFields(inertia, slope, torque + self._carried(own, motion), torque)
 
     def joint_forces(

@@ -26,6 +26,7 @@ Quantity = Literal["none", "torque", "force", "gas", "pressure"]
 Over = Literal["angle", "stroke"]
 During = Literal["forward", "return", "both"]
 Sense = Literal["resisting", "fixed"]
+EfficiencyIs = Literal["power", "work"]
 
 #: Mechanisms with dimensions: those whose working part a force can act on.
 LINKED: frozenset[str] = frozenset(get_args(MechanismKind)) - {"none", "table", "formula"}
@@ -97,6 +98,9 @@ class OperationChoice:
         A positive force is against the motion in either direction, or always against the forward stroke.
     steps : int
         Number of steps.
+    efficiency_is : {"power", "work"}
+        Whether the efficiency is the share of the power that passes at each angle, in either direction, or of the work
+        of a cycle.
     """
 
     quantity: Quantity = "none"
@@ -107,6 +111,7 @@ class OperationChoice:
     table: Table | None = None
     formula: str | None = None
     steps: int = 0
+    efficiency_is: EfficiencyIs = "power"
 
 
 @dataclass(frozen=True, slots=True)

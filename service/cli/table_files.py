@@ -13,7 +13,7 @@ from sprag_study.service.languages import N_, _
 _KEPT: Final[Mapping[str, frozenset[str]]] = {
     "mechanism": frozenset({"interpolation"}),
     "operation": frozenset(
-        {"quantity", "over", "during", "sense", "interpolation", "scale", "efficiency", "recorded_at"}
+        {"quantity", "over", "during", "sense", "interpolation", "scale", "efficiency", "efficiency_is", "recorded_at"}
     ),
     "indicator": frozenset({"over", "interpolation", "piston_area", "back_pressure", "recorded_at"}),
     "torque": frozenset({"interpolation"}),

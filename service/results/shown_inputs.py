@@ -16,6 +16,7 @@ from sprag_study.service.reading.wording import number, unit_text, words
 from sprag_study.service.results.varied import formula_text, values_text
 from sprag_study.service.spec.described import ANY_RUN, DURATION, SETTLED_RUN
 from sprag_study.service.spec.machine.shaft import MEAN_SPEED_IS
+from sprag_study.service.spec.machine.shaft_parts import EFFICIENCY_IS
 from sprag_study.worker.models.parameters import parameter_of
 from sprag_study.worker.models.vocabulary import ordinal
 
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 _RUN: Final = {entry.name: entry for entry in (*SETTLED_RUN.values(), DURATION, *ANY_RUN.values())}
 _NUMBER: Final = re.compile(rf"({'|'.join(NUMBERED)})\.(\d+)\.")
 #: What values of choices are called where their own words do not say it.
-_CALLED: Final = {entry.name: dict(entry.choices) for entry in (MEAN_SPEED_IS,)}
+_CALLED: Final = {entry.name: dict(entry.choices) for entry in (MEAN_SPEED_IS, EFFICIENCY_IS)}
 _YES_NO: Final = {"true": N_("yes"), "false": N_("no")}
 _COUNT: Final = re.compile(r"(\d+) (period|revolution)s?")
 
@@ -67,8 +68,9 @@ def in_words(item: Input) -> float | str | None:
     """The value of an input: a choice in words, a count with its unit, a number as it is."""
     if not isinstance(item.value, str):
         return item.value
-    if item.path in _CALLED:
-        return gettext(_CALLED[item.path][item.value])
+    name = item.path.rpartition(".")[2]
+    if name in _CALLED:
+        return gettext(_CALLED[name][item.value])
     if _COUNT.fullmatch(item.value):
         return _counted(item.value)
     parts = item.value.split(", ")

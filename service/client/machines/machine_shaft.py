@@ -474,6 +474,8 @@ class ShaftOperation(TypedDict, total=False):
     over : Against the shaft's angle, or the fraction of the stroke, or recorded over time.
     during : Strokes in which a diagram over the stroke holds.
     sense : A force against the motion, or always against the forward stroke.
+    efficiency_is : Whether the efficiency is the share of the power that passes at each angle, or of the work of a
+        cycle.
     interpolation : How rows of the table are joined: without overshoot, or by straight lines.
     scale : Factor on the whole diagram (k); >= -1e+30 and <= 1e+30.
     efficiency : Power given over power taken between the shaft and the operation (eta); > 0 and <= 1.
@@ -491,6 +493,7 @@ class ShaftOperation(TypedDict, total=False):
     over: Literal["angle", "stroke", "time"]
     during: Literal["forward", "return", "both"]
     sense: Literal["resisting", "fixed"]
+    efficiency_is: Literal["power", "work"]
     interpolation: Literal["smooth", "linear"]
     scale: Quantity
     efficiency: Quantity
@@ -505,7 +508,7 @@ class ShaftPart(TypedDict, total=False):
         slider_crank, four_bar, drag_link, toggle, scotch_yoke, parallel_crank, quick_return, cam, linkage,
         interpolation.
     operation : What resists; fields value, steps, table, csv, formula, gas, indicator, quantity, over, during, sense,
-        interpolation, scale, efficiency, recorded_at.
+        efficiency_is, interpolation, scale, efficiency, recorded_at.
     """
 
     crank_angle: Quantity
@@ -836,7 +839,7 @@ class Shaft(Studies):
             interpolation.
         operation : values, optional
             What resists; fields value, steps, table, csv, formula, gas, indicator, quantity, over, during, sense,
-            interpolation, scale, efficiency, recorded_at.
+            efficiency_is, interpolation, scale, efficiency, recorded_at.
         parts : values, optional
             Several mechanisms on the shaft, each with its operation and at its crank angle; fields crank_angle,
             mechanism, operation.

@@ -90,6 +90,8 @@ def _element_text(element: Mapping[str, Any]) -> str:
 
 def _operation_choices(operation: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     form = operation.get("form", operation["quantity"])  # a gas has no form; without an operation there is neither
+    if "efficiency_is" in operation:
+        yield "operation.efficiency_is", operation["efficiency_is"]
     if operation["quantity"] == "pressure":
         yield "operation", "indicator"
         yield "operation.over", operation["over"]

@@ -51,12 +51,19 @@ INDICATOR_OVER: Final = choice("over", _AGAINST, "angle", "stroke", "time", defa
 _OVER: Final = "against the shaft's angle, or the fraction of the stroke, or recorded over time"
 _DURING: Final = "strokes in which a diagram over the stroke holds"
 _SENSE: Final = "a force against the motion, or always against the forward stroke"
+_EFFICIENCY_IS: Final = (
+    "whether the efficiency is the share of the power that passes at each angle, or of the work of a cycle"
+)
 OPERATION_CHOICES: Final = named(
     choice("quantity", "a force on the working part, or a torque on the shaft", "force", "torque"),
     choice("over", _OVER, "angle", "stroke", "time", default="angle"),
     choice("during", _DURING, "forward", "return", "both", default="forward"),
     choice("sense", _SENSE, "resisting", "fixed", default="resisting"),
 )
+EFFICIENCY_IS: Final = choice(
+    "efficiency_is", _EFFICIENCY_IS, "power", "work", default="power", label=N_("Efficiency means"),
+    called={"power": N_("share of the power, in either direction"), "work": N_("share of the work of a cycle")},
+)  # fmt: skip
 _NAME = re.compile(r"[A-Za-z_][A-Za-z_0-9]{0,39}")
 _ANY: Final = 1e30
 ANGLE = Parameter("angle", "phi", "rad", -100.0, 100.0, False, None, "angle of the shaft")
@@ -149,6 +156,7 @@ OPERATION: Final = Record(
         "gas": _GAS,
         "indicator": _INDICATOR,
         **OPERATION_CHOICES,
+        EFFICIENCY_IS.name: EFFICIENCY_IS,
         "interpolation": INTERPOLATION,
         **numbers_under("operation."),
         "recorded_at": RECORDED_AT,
@@ -258,6 +266,28 @@ def read_operation(node: Node, places: dict[str, str], prefix: str = "") -> dict
         return {"quantity": "none", "over": "angle", "steps": 0}
     if not OPERATION.read(node):
         return None
+    share = _read_efficiency_is(node)
+    if share is None:
+        return None
+    operation = _read_course(node, places, prefix)
+    return operation and operation | share
+
+
+def _read_efficiency_is(node: Node) -> dict[str, str] | None:
+    """What the efficiency means, where that is not the usual; None with a fault recorded."""
+    means = EFFICIENCY_IS.read(node)
+    if means != "work":
+        return None if means is None else {}
+    own = node[EFFICIENCY_IS.name]
+    if "formula" in node:
+        own.refuse("conflict", "is not possible for a formula, whose work over the cycle is not known before",
+                   allowed=N_('"power", or another diagram'))  # fmt: skip
+        return None
+    return {EFFICIENCY_IS.name: "work"}
+
+
+def _read_course(node: Node, places: dict[str, str], prefix: str) -> dict[str, Any] | None:
+    """Read the resistance of an operation: its form and its variable."""
     if "gas" in node:
         well = not _beside(node, "gas") and _GAS.read(node["gas"])
         return {"quantity": "gas", "over": "angle", "steps": 0} if well else None
@@ -284,16 +314,20 @@ def read_operation(node: Node, places: dict[str, str], prefix: str = "") -> dict
     return None if diagram is None else _over_angle(operation | diagram, speed)
 
 
+#: Fields that every operation has.
+_SHARE: Final = ("scale", "efficiency", EFFICIENCY_IS.name)
+
+
 def _beside(node: Node, form: str) -> bool:
     """Whether there are fields beside a gas or an indicator diagram that do not belong to it; each is a fault."""
-    foreign = [name for name in node.value if name not in {form, "scale", "efficiency"}]
+    foreign = [name for name in node.value if name not in {form, *_SHARE}]
     for name in foreign:
         node[name].refuse(
             "not-used",
             "does not belong to a gas, which acts on the working part over the whole cycle"
             if form == "gas"
             else "does not belong to an indicator diagram, which acts on the working part over the whole cycle",
-            allowed=f"{form}, scale, efficiency",
+            allowed=", ".join((form, *_SHARE)),
         )
     return bool(foreign)
 

@@ -189,6 +189,51 @@ def test_air_compressor_with_losses() -> None:
     assert one(driven, numbers | losses)["motor.power.mean"] == pytest.approx(12.91e3, abs=5.0)
 
 
+@pytest.mark.parametrize("back", [0.0, 1.013e5, 2.4e5])
+def test_an_efficiency_of_the_work_does_not_depend_on_what_circulates(back: float) -> None:
+    """The books divide the indicated power by the efficiency: 5.54 and 12.91 kW, whatever presses on the piston's back.
+
+    With clearance too, against the work of the cycle in closed form.
+    """
+    gas = OperationChoice("gas", efficiency_is="work")
+    spec = MachineSpec(mechanism=MechanismChoice("slider_crank"), operation=gas)
+    numbers = compressor(1.0 / 300.0, 300.0, (1.013e5, 7e5), 1.35) | {"operation.gas.back_pressure": back}
+    driven = replace(spec, drive=Drive(stages=("belt",)))
+    losses = {"drive.stages.0.ratio": 4.0, "operation.efficiency": 0.85}
+    got = one(driven, numbers | losses | {"drive.stages.0.efficiency": 0.9})
+    assert got["motor.power.mean"] == pytest.approx(5540, abs=5.0)
+    numbers = compressor(0.25 * 22.0 / 7.0 * 0.2**2 * 0.24, 300.0, (1.01325e5, 8 * 1.01325e5), 1.35)
+    numbers |= {"operation.gas.back_pressure": back}
+    got = one(driven, numbers | losses | {"drive.stages.0.efficiency": 0.96})
+    assert got["motor.power.mean"] == pytest.approx(12.91e3, abs=5.0)
+    clearance, ratio, n, swept = 0.06, 6.5, 1.3, 0.01
+    drawn = swept * (1.0 + clearance - clearance * ratio ** (1.0 / n))
+    work = n / (n - 1.0) * 1e5 * drawn * (ratio ** ((n - 1.0) / n) - 1.0)
+    numbers = compressor(swept, 400.0, (1e5, ratio * 1e5), n) | {"operation.gas.clearance": clearance}
+    numbers |= {"operation.gas.back_pressure": back, "operation.efficiency": 0.8}
+    assert one(spec, numbers)["work.resistance"] == pytest.approx(-work / 0.8, rel=1e-11)
+    by_power = one(replace(spec, operation=OperationChoice("gas")), numbers)["work.resistance"]
+    assert by_power < -work / 0.8 * 1.001  # charged on what circulates
+
+
+def test_an_engine_gives_the_share_of_its_work_evenly() -> None:
+    """Four strokes as triangles of a table: a constant torque is lost, half of the parts at half of the angle."""
+    rows = tuple((0.5 * math.pi * k, value) for k, value in enumerate((0.0, -90.0, 0.0, 40.0, 0.0)))
+    table = Table(rows, "linear")
+    spec = MachineSpec(operation=OperationChoice("torque", "table", table=table, efficiency_is="work"))
+    numbers = {"mean_speed": 30.0, "drive.inertia": 2.0, "operation.scale": 1.5, "operation.efficiency": 0.7}
+    work = 1.5 * 0.5 * math.pi * (90.0 - 40.0)
+    got, free = one(spec, numbers), one(spec, numbers | {"operation.efficiency": 1.0})
+    assert got["work.resistance"] == pytest.approx(0.7 * work, rel=1e-12)
+    assert got["energy.fluctuation"] == pytest.approx(free["energy.fluctuation"], rel=1e-12)
+    assert got["torque.harmonics.1"] == pytest.approx(free["torque.harmonics.1"], rel=1e-12)
+    turned = MachineSpec(parts=(PartChoice(operation=spec.operation), PartChoice()))
+    parts = {f"parts.0.{path}": value for path, value in numbers.items() if path.startswith("operation")}
+    shaft = {path: value for path, value in numbers.items() if not path.startswith("operation")}
+    found = one(turned, shaft | parts | {"parts.0.crank_angle": 1.0})
+    assert found["work.resistance"] == pytest.approx(got["work.resistance"], rel=1e-12)
+
+
 def test_double_acting_compressor() -> None:
     """Arasu 5.2: 37 kW, 100 rpm, piston speed 151.5 m/min, 0.98 to 5.8 bar, n = 1.2: stroke 0.7575 m, bore 0.303 m.
 

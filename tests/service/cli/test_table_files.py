@@ -87,7 +87,7 @@ def test_what_stays_beside_a_table_are_fields_of_the_spec() -> None:
     from sprag_study.service.cli.table_files import _KEPT
 
     beside = {"interpolation", shaft_parts.RECORDED_AT.path}
-    assert _KEPT["operation"] == {*shaft_parts.OPERATION_CHOICES, *beside, "scale", "efficiency"}
+    assert _KEPT["operation"] == {*shaft_parts.OPERATION_CHOICES, *beside, "scale", "efficiency", "efficiency_is"}
     assert _KEPT["indicator"] == {"over", *beside, *shaft_numbers.numbers_under("operation.indicator.")}
     own = shaft_numbers.numbers_of({"balance": "motor", "drive": {"motor": "table"}}, "drive.motor.")
     assert _KEPT["motor"] == {"interpolation", *own}

@@ -132,7 +132,7 @@ _COURSE: Final = (
     FormField("operation/sense"),
     FormField("operation/recorded_at", hidden=(Hidden(_OVER, ("angle", "stroke")),)),
 )  # fmt: skip
-_SHARE: Final = _fields("operation", "scale", "efficiency")
+_SHARE: Final = _fields("operation", "scale", "efficiency", "efficiency_is")
 _STEPS: Final = FormField(
     "operation/steps", "steps", "Steps", "one step a line: from; to; value", example="120 deg; 180 deg; 20 kN",
     required=True, lines=3,

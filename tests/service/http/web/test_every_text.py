@@ -46,7 +46,8 @@ _SAME = re.compile(
 _CHOICES = {"slider_crank", "force", "angle", "steps", "constant", "midrange", "resisting", "none"}
 _CHOSEN = {
     *("cycle", "mean_speed_is", "balance", "balance_side", "phi_c", "drive.motor.kind", "drive.flywheel.kind"),
-    *("drive.stages", "mechanism", "operation", *(f"operation.{name}" for name in OPERATION_CHOICES)),
+    *("drive.stages", "mechanism", "operation"),
+    *(f"operation.{name}" for name in (*OPERATION_CHOICES, "efficiency_is")),
     *(f"mechanism.{kind}.{name}" for kind, own in MECHANISM_CHOICES.items() for name in own),
     *(f"mechanism.linkage.{name}" for name in ("elements", "working", "forward")),
     *(f"{part}.interpolation" for part in ("drive.torque", "mechanism", "operation")),
