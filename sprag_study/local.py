@@ -11,8 +11,10 @@ from sprag_study.service.client.queries import spec_of
 from sprag_study.service.client.synchronous.study import Study
 from sprag_study.service.here import Here
 from sprag_study.service.jobs.local import opened, pool_size, run_folder, run_stored
+from sprag_study.service.jobs.start_from import with_components
 from sprag_study.service.plain_data import plain
 from sprag_study.service.settings import Settings
+from sprag_study.service.spec.component_axes import names_components
 from sprag_study.service.spec.document import SpecError, parse_spec
 from sprag_study.service.storage.store import Store
 from sprag_study.service.storage.studies.copying import copy_study
@@ -208,6 +210,9 @@ def run(
     data, faults = plain(spec_of(spec, cases))
     if faults:
         raise SpecError(faults)
+    if database is not None and names_components(data):
+        with Store.open(Settings(database=database).database_url) as store:
+            data = with_components(store, data)
     parsed = parse_spec(data)
     here = _Local(database, processes)
     try:

@@ -14,6 +14,28 @@ from dataclasses import asdict, dataclass
 from typing import Any, Final, Self
 
 
+class Named(str):
+    """The unit of numbers that stand for names, 0 for the first of ``names``: "1" for programs, no unit for people."""
+
+    names: tuple[str, ...]
+
+    __slots__ = ("names",)
+
+    def __new__(cls, names: Iterable[str]) -> Self:
+        """The unit of the numbers of these names."""
+        made = super().__new__(cls, "1")
+        made.names = tuple(names)
+        return made
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), (self.names,)
+
+
+def name_of(value: float | None, unit: str) -> str | None:
+    """The name for which a number stands; None where numbers of the unit stand for no names."""
+    return unit.names[int(value)] if isinstance(unit, Named) and value is not None else None
+
+
 @dataclass(frozen=True, slots=True)
 class Amount:
     """A number in SI with its unit, a dash for none, rounded to ``digits``; ``bare`` shows the number without the unit.
@@ -31,6 +53,8 @@ class Amount:
 
     def __str__(self) -> str:
         value, unit = self.value, self.unit
+        if (name := name_of(value, unit)) is not None:
+            return name
         if self.degrees and value is not None:
             value, unit = math.degrees(value), "deg"
         text = "–" if value is None else format(value, self.form or f".{self.digits}g")
@@ -158,6 +182,8 @@ def _part_to_json(part: Part) -> Any:
         return {"clause": _part_to_json(part.sentence)}
     if isinstance(part, Whole):
         return {"whole": _part_to_json(part.clause)}
+    if isinstance(part, Amount) and (name := name_of(part.value, part.unit)) is not None:
+        return name
     return part if isinstance(part, str | int) else {type(part).__name__.lower(): asdict(part)}
 
 

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag_study.worker.derived import blocks
-from sprag_study.worker.spread import DRIVE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -38,15 +37,16 @@ def case_keys(study: Study, kin: str, first: int = 0) -> Keys:
     drawn = () if study.spread is None else study.spread.paths
     single = [path for path in study.base if path not in study.column_paths]
     start = sum(int(_mixed(np.array([study.base[path]]), kin, path)[0]) for path in single) % 2**64
-    along = [_along(axis, kin, {*drawn, DRIVE}) for axis in study.axes]
+    follows = [path for path in study.component_paths if path not in {*study.apart, *drawn}]
+    along = [_along(axis, kin, {*drawn, *study.apart}) for axis in study.axes]
     keys = np.empty(study.cases, dtype=np.uint64)
     for block in blocks(study):
         total = np.full(len(block), start, dtype=np.uint64)
         for words, index in zip(along, study.indices(block), strict=True):
             total += words[index]
-        if drawn or study.derive:
+        if drawn or study.derive or follows:
             columns = study.columns(block)
-            for path in (*drawn, *study.derive):
+            for path in (*follows, *drawn, *study.derive):
                 total += _mixed(columns[path], kin, path)
         keys[block.start : block.stop] = total
     return keys[first:].view(np.int64)

@@ -29,6 +29,7 @@ def involved(study: Study, paths: Iterable[str]) -> Study:
     """
     paths = tuple(paths)
     roots = sources(study.derive, study.base, paths)
+    roots |= {one.path for one in map(study.components_of, roots) if one is not None}
     spread = None if study.spread is None else study.spread.of(roots)
     if spread is not None:
         roots |= {DRIVE}

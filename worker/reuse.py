@@ -16,7 +16,6 @@ import numpy as np
 
 from sprag_study.worker import models
 from sprag_study.worker.derived import distinct_values
-from sprag_study.worker.spread import DRIVE
 from sprag_study.worker.study import Axis
 from sprag_study.worker.sweeps import whole_lines
 
@@ -177,16 +176,17 @@ def span(study: Study) -> Values:
         The paths are sorted by name, which is the same order for all studies of a `kin_hash`.
     """
     spans = {path: (value, value) for path, value in study.base.items()}
-    for axis in study.axes if study.spread is None else study.axes[:-1]:
-        spans.update(dict.fromkeys(axis.paths, (float(axis.array.min()), float(axis.array.max()))))
-    for path in (*study.derive, *_drawn(study)):
+    for axis in study.axes:
+        if study.apart.isdisjoint(axis.paths):
+            spans.update(dict.fromkeys(axis.paths, (float(axis.array.min()), float(axis.array.max()))))
+    for path in (*_of_components(study), *study.derive, *_drawn(study)):
         values = distinct_values(study, path)
         spans[path] = (float(values[0]), float(values[-1]))
     return np.array([spans[path] for path in sorted(spans)], dtype=np.float64).reshape(-1, 2).T
 
 
 def _paths(study: Study) -> list[str]:
-    return sorted({*study.base, *study.axis_paths} - {DRIVE})
+    return sorted({*study.base, *study.axis_paths} - study.apart)
 
 
 def _axis_pairs(new: Study, old: Study) -> list[str]:
@@ -196,11 +196,12 @@ def _axis_pairs(new: Study, old: Study) -> list[str]:
     """
     found: dict[tuple[object, ...], str] = {}
     ours, theirs = _axes_of(new), _axes_of(old)
-    apart = {*new.derive, *old.derive, *_crossed(new), *_crossed(old), DRIVE}
+    apart = {*new.derive, *old.derive, *_crossed(new), *_crossed(old), *new.apart, *old.apart}
+    single = {*_drawn(new), *_drawn(old), *_of_components(new), *_of_components(old)}
     for path in dict.fromkeys((*new.base, *new.axis_paths)):
         if path in apart:
             continue
-        if path in _drawn(new) or path in _drawn(old):
+        if path in single:
             found[(path,)] = path
             continue
         axes = (ours.get(path), theirs.get(path))
@@ -223,6 +224,11 @@ def _derived(new: Study, old: Study) -> list[str]:
 def _drawn(study: Study) -> tuple[str, ...]:
     """The paths with tolerances."""
     return () if study.spread is None else study.spread.paths
+
+
+def _of_components(study: Study) -> list[str]:
+    """The parameters that follow from the component on an axis."""
+    return [path for path in study.component_paths if path not in study.apart]
 
 
 def _crossed(study: Study) -> list[str]:

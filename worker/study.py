@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from sprag_study.worker.axis import SAME_VALUE, Axis
 from sprag_study.worker.directions import DOWN, SWEEP, UP
 from sprag_study.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_CASES, MAX_COLUMNS
+from sprag_study.worker.models.components import Components
 from sprag_study.worker.models.formulas import evaluate
 from sprag_study.worker.models.quantities import Quantity
 from sprag_study.worker.packed import packed, unpacked
@@ -61,6 +62,9 @@ class Study:
         case.
     quantities : tuple of Quantity
         Formulas over parameters and results that it has beside the results of its model. They change no row.
+    components : tuple of Components
+        Springs, clutches or motors among which it chooses, of each kind at most once. An axis with their path has
+        their numbers.
 
     Raises
     ------
@@ -80,6 +84,7 @@ class Study:
     spread: Spread | None = None
     sweep: str | None = None
     quantities: tuple[Quantity, ...] = ()
+    components: tuple[Components, ...] = ()
 
     def __post_init__(self) -> None:
         if self.combine not in get_args(Combine):
@@ -95,6 +100,7 @@ class Study:
             raise ValueError("axes that are zipped must have equal lengths")
         self._check_spread(paths)
         _check_sweep(self, paths)
+        _check_components(self, paths)
         own = (self.spread is not None) + (self.sweep is not None)
         most = (MAX_AXES if self.combine == "grid" else MAX_COLUMNS) + own
         if len(self.axes) > most or sum(map(len, self.axes)) > MAX_AXIS_VALUES or self.cases > MAX_CASES:
@@ -154,7 +160,29 @@ class Study:
     def column_paths(self) -> tuple[str, ...]:
         """Every path that `columns` gives: those on axes, those with tolerances, then the derived ones."""
         drawn = () if self.spread is None else self.spread.paths
-        return tuple(dict.fromkeys((*self.axis_paths, *drawn, *self.derive)))
+        return tuple(dict.fromkeys((*self.axis_paths, *self.component_paths, *drawn, *self.derive)))
+
+    @property
+    def component_paths(self) -> tuple[str, ...]:
+        """Every path whose value follows from the component on an axis."""
+        return tuple(path for one in self.components if self.axis_of(one.path) is not None for path in one.columns)
+
+    @property
+    def beside(self) -> frozenset[str]:
+        """The `column_paths` that are not parameters of its machine."""
+        of_components = (path for one in self.components for path in (one.path, *one.numbers))
+        return frozenset((DRIVE, SWEEP, *of_components))
+
+    @property
+    def apart(self) -> frozenset[str]:
+        """The `column_paths` that say nothing about what a case is: equal cases may differ in them."""
+        return self.beside - {SWEEP}
+
+    def components_of(self, path: str) -> Components | None:
+        """The components from which the value of ``path`` follows; None where it follows from none."""
+        return next(
+            (one for one in self.components if path in one.columns and self.axis_of(one.path) is not None), None
+        )
 
     def axis_of(self, path: str) -> int | None:
         """Position of the axis that varies ``path``; None when it does not vary."""
@@ -207,6 +235,9 @@ class Study:
         for axis, index in zip(self.axes, self.indices(cases), strict=True):
             column = axis.array[index]
             found.update(dict.fromkeys(axis.paths, column))
+        for one in self.components:
+            if one.path in found:
+                found |= {path: one.along(path, found[one.path]) for path in one.columns}
         if self.spread is not None:
             found |= self.spread.columns(self.base, found)
         return found | evaluate(self.derive, self.base, found, len(cases)) if self.derive else found
@@ -230,7 +261,7 @@ class Study:
         """Numbers of the cases in which every path in ``fixed`` has the given value (SI, within `SAME_VALUE`).
 
         A path that does not vary matches when its base value does, and one with a tolerance by its nominal value. Only
-        the axes of a zip are scanned, and the cases that match otherwise for a derived path.
+        the axes of a zip are scanned, and the cases that match otherwise for a path that is derived or of a component.
 
         Returns
         -------
@@ -242,7 +273,8 @@ class Study:
             When a path is neither on an axis nor in the base.
         """
         nothing: NDArray[np.int64] = np.empty(0, dtype=np.int64)
-        derived = {path: value for path, value in fixed.items() if path in self.derive}
+        follows = {*self.derive, *self.component_paths}
+        derived = {path: value for path, value in fixed.items() if path in follows}
         if derived:
             cases = self.cases_at({path: value for path, value in fixed.items() if path not in derived})
             columns = self.columns(cases)
@@ -283,12 +315,14 @@ class Study:
 
         None where it depends on no axis, is derived, or depends on both its own axis and the drive.
         """
-        at = self.axis_of(path)
+        one = self.components_of(path)
+        at = self.axis_of(path if one is None else one.path)
+        values = None if at is None else self.axes[at].array if one is None else one.along(path, self.axes[at].array)
         if self.spread is None or path not in self.spread.paths:
-            return None if at is None else (at, self.axes[at].array)
+            return None if at is None or values is None else (at, values)
         if at is not None and self.combine == "grid":
             return None
-        nominal = self.base[path] if at is None else self.axes[at].array
+        nominal = self.base[path] if values is None else values
         return len(self.axes) - 1, self.spread.values(path, nominal, self.axes[-1].array)
 
     def points(self, cases: range) -> NDArray[np.float64]:
@@ -327,6 +361,7 @@ class Study:
             **({} if self.spread is None else {"spread": self.spread.to_json()}),
             **({} if self.sweep is None else {"sweep": self.sweep}),
             **({"quantities": {one.name: one.to_json() for one in self.quantities}} if self.quantities else {}),
+            **({"components": [one.to_json() for one in self.components]} if self.components else {}),
         }
 
     def to_text(self) -> str:
@@ -355,6 +390,7 @@ class Study:
             spread=Spread.from_json(data["spread"]) if data.get("spread") else None,
             sweep=data.get("sweep"),
             quantities=tuple(Quantity.from_json(*item) for item in data.get("quantities", {}).items()),
+            components=tuple(map(Components.from_json, data.get("components", ()))),
         )
 
     def physics_hash(self, engine_version: str) -> str:
@@ -391,6 +427,22 @@ def _check_sweep(study: Study, paths: Sequence[str]) -> None:
         raise ValueError("the swept path must be on an axis")
     if not np.isin(study.axes[-1].array, (UP, DOWN)).all():
         raise ValueError("a direction is 0 (up) or 1 (down)")
+
+
+def _check_components(study: Study, paths: Sequence[str]) -> None:
+    """Raise ValueError where components have no axis of their own, or a number that they have not.
+
+    ``paths`` are those of all axes. Parts of a study (`sprag_study.worker.derived.involved`) may lack the axis.
+    """
+    every = [path for one in study.components for path in (one.path, *one.columns)]
+    if len(set(every)) < len(every) or not set(study.component_paths).isdisjoint((*paths, *study.derive)):
+        raise ValueError("a parameter of components is on an axis, derived, or of two kinds of components")
+    for one in study.components:
+        axis = next((axis for axis in study.axes if one.path in axis.paths), None)
+        if axis is not None and (axis.array != np.floor(axis.array)).any():
+            raise ValueError("a component has no number")
+        if axis is not None and not 0 <= axis.array.min() <= axis.array.max() < len(one.names):
+            raise ValueError("there is no component of that number")
 
 
 def without_drives(study: Study) -> Study:

@@ -33,7 +33,7 @@ class _DateTime:
 #: A time as RFC 3339 text in UTC.
 Moment = Annotated[str, _DateTime()]
 Number = float | int | None
-#: Of a parameter: an SI number, or the direction of a sweep, "up" or "down".
+#: Of a parameter: an SI number; the direction of a sweep, "up" or "down"; the name of a component.
 Value = float | str
 
 

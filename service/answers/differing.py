@@ -9,6 +9,8 @@ from typing import Any, Final
 MOST_COMPARED: Final = 10
 #: Axes without a parameter: the drives of a batch, and the directions of a sweep.
 NO_PARAMETERS: Final = frozenset({"drive", "sweep"})
+#: Axes of components, which are others in each study.
+COMPONENTS: Final = frozenset({"spring", "clutch", "motor"})
 
 
 def differing(specs: Sequence[Mapping[str, Any]]) -> dict[str, tuple[Any, ...]]:
@@ -25,7 +27,7 @@ def common_axes(studies: Sequence[Sequence[tuple[Sequence[str], int]]]) -> list[
     An axis is its paths and its number of values.
     """
     varying = [{path for paths, count in axes if count > 1 for path in paths} for axes in studies]
-    shared = set[str].intersection(*varying).difference(NO_PARAMETERS)
+    shared = set[str].intersection(*varying).difference(NO_PARAMETERS, COMPONENTS)
     return [paths[0] for paths, _count in studies[0] if paths[0] in shared]
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, NotRequired
 
 from typing_extensions import TypedDict
 
-from sprag_study.service.answers import Doc, Number
+from sprag_study.service.answers import Doc, Number, Value
 
 
 class DesignVariable(TypedDict):
@@ -18,6 +18,7 @@ class DesignVariable(TypedDict):
     low: Annotated[float, Doc("least value, SI")]
     high: Annotated[float, Doc("largest value, SI")]
     values: Annotated[list[float], Doc("the listed values, SI; empty for a range")]
+    names: NotRequired[Annotated[list[str], Doc("names of the components, in the order of `values`; left out: none")]]
 
 
 class Counted(TypedDict):
@@ -60,7 +61,7 @@ class Design(TypedDict):
     cases: Annotated[list[int], Doc("its cases of the nominal drive, one for each operating point")]
     round: Annotated[int, Doc("number of the round that it belongs to, from 1")]
     phase: Annotated[Literal["search", "polish"], Doc("whether a generation or the polish of equalities asked for it")]
-    variables: Annotated[dict[str, float], Doc("value of each variable by its name, SI")]
+    variables: Annotated[dict[str, Value], Doc("value of each variable by its name, SI; a component by its own")]
     goals: Annotated[dict[str, Number], Doc("each goal over the operating points, SI; null where it is missing")]
     results: Annotated[
         dict[str, list[Number | str]],

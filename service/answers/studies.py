@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NotRequired
 
 from typing_extensions import TypedDict
 
@@ -129,6 +129,9 @@ class AxisInfo(TypedDict):
     last: Annotated[float, Doc("the last value, SI; of a study that chooses its own cases, the largest")]
     least: Annotated[float, Doc("the least value, SI")]
     largest: Annotated[float, Doc("the largest value, SI")]
+    names: NotRequired[
+        Annotated[list[str], Doc("names of the components, whose numbers are the values; left out: no components")]
+    ]
 
 
 class Origin(TypedDict):

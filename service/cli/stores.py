@@ -90,25 +90,27 @@ def require_store(db: str | None) -> None:
 
 
 def started_in(db: str | None, change: Callable[[object], object] | None = None) -> Callable[[object], object] | None:
-    """What completes a spec: ``change``, then the state at the end of the case of a database (``db``, the option) from
-    which its drive starts.
+    """What completes a spec: ``change``, then what it names of a database (``db``, the option).
+
+    These are components, and the case from whose end its drive starts.
     """
     if db is None:
         return change
 
-    def completed(spec: object) -> object:
-        from sprag_study.service.jobs.start_from import with_start
+    def complete(spec: object) -> object:
+        from sprag_study.service.jobs.start_from import completed
+        from sprag_study.service.spec.component_axes import names_components
         from sprag_study.service.spec.machine.drive import START
         from sprag_study.service.storage.store import Store
 
         whole = spec if change is None else change(spec)
         base = whole.get("base") if isinstance(whole, Mapping) else None
-        if not (isinstance(base, Mapping) and START in base):
+        if not (isinstance(base, Mapping) and START in base) and not names_components(whole):
             return whole
         with Store.open(read_settings(database=db).database_url, create=False) as store:
-            return with_start(store, whole)
+            return completed(store, whole)
 
-    return completed
+    return complete
 
 
 @contextmanager

@@ -12,7 +12,7 @@ import pyarrow as pa
 
 from sprag_study.service.exports.inputs import column_description
 from sprag_study.service.exports.source import machine
-from sprag_study.worker.directions import SWEEP
+from sprag_study.service.reading.directions import is_named
 
 if TYPE_CHECKING:
     from sprag_study.service.exports.source import Source
@@ -58,7 +58,7 @@ def schema(source: Source) -> pa.Schema:
     fields += [
         pa.field(
             path,
-            pa.string() if path == SWEEP else pa.float64(),
+            pa.string() if is_named(study, path) else pa.float64(),
             nullable=False,
             metadata={"unit": source.unit(path), "description": column_description(study, path)},
         )

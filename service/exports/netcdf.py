@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sprag_study.sentences import Named
 from sprag_study.service.exports.inputs import column_description, description_of
 from sprag_study.service.exports.source import machine
 from sprag_study.service.exports.spool import require_room, spooled
@@ -86,8 +87,8 @@ class _Grid:
     ----------
     dims : names in the file of the dimensions: the first path of each axis of a grid; ``case`` where axes are zipped
     shape : their lengths
-    labels : coordinates that are not dimensions: the case number in a grid, further paths of tied axes, drawn and
-        derived paths
+    labels : coordinates that are not dimensions: the case number in a grid, further paths of tied axes, and paths
+        that are of a component, drawn or derived
     """
 
     def __init__(self, study: Study) -> None:
@@ -97,9 +98,11 @@ class _Grid:
         self.shape = study.shape or ((1,) if self._together else ())
         self._orders = [slice(None)] if self._together else [_order(axis) for axis in study.axes]
         paths = study.axis_paths if self._together else [path for axis in study.axes for path in axis.paths[1:]]
-        drawn = [] if study.spread is None else [path for path in study.spread.paths if path not in study.axis_paths]
-        self._drawn = drawn
-        self.labels = [*([] if self._together else [_CASE]), *map(cf_name, (*paths, *drawn, *study.derive))]
+        drawn = () if study.spread is None else study.spread.paths
+        others = [path for path in dict.fromkeys((*study.component_paths, *drawn)) if path not in study.axis_paths]
+        self._drawn = [path for path in others if study.varied(path) is not None]
+        self._of_cases = [*(path for path in others if path not in self._drawn), *study.derive]
+        self.labels = [*([] if self._together else [_CASE]), *map(cf_name, (*paths, *self._drawn, *self._of_cases))]
 
     def place(self, column: NDArray[Any]) -> NDArray[Any]:
         """A column in the order of cases as an array over the dimensions."""
@@ -131,6 +134,9 @@ class _Grid:
                 attributes = _attributes(path, unit_of(study, path), description_of(study, path))
                 if path == SWEEP:
                     attributes |= {"flag_values": [float(UP), float(DOWN)], "flag_meanings": " ".join(DIRECTIONS)}
+                if isinstance(unit := unit_of(study, path), Named):
+                    meanings = " ".join("_".join(name.split()) for name in unit.names)
+                    attributes |= {"flag_values": np.arange(float(len(unit.names))), "flag_meanings": meanings}
                 found[cf_name(path)] = xr.Variable(self.dims[dimension], axis.array[order], attributes, unfilled)
         for path in self._drawn:
             position, values = study.varied(path) or (0, np.empty(0))
@@ -146,9 +152,9 @@ class _Grid:
         return {**found, _CASE: numbers}
 
     def _derived(self) -> dict[str, Floats]:
-        """The derived parameters of every case."""
-        parts = [self._study.columns(cases) for cases in blocks(self._study)] if self._study.derive else []
-        return {path: np.concatenate([part[path] for part in parts]) for path in self._study.derive}
+        """The parameters of every case that follow from several axes, or from others."""
+        parts = [self._study.columns(cases) for cases in blocks(self._study)] if self._of_cases else []
+        return {path: np.concatenate([part[path] for part in parts]) for path in self._of_cases}
 
 
 def _order(axis: Axis) -> Any:

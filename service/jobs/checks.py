@@ -13,7 +13,7 @@ import numpy as np
 
 from sprag_study.service.faults import FaultError, parameter_error
 from sprag_study.service.jobs.preview import preview_json
-from sprag_study.service.jobs.start_from import with_start
+from sprag_study.service.jobs.start_from import completed
 from sprag_study.service.jobs.submission import Order, Submission, submission
 from sprag_study.service.json_text import to_bytes
 from sprag_study.service.reading import units
@@ -85,7 +85,7 @@ def submitted(order: Order, study: Callable[..., ParsedSpec], library: Library, 
 
 def new_study(library: Library, body: Body) -> ParsedSpec:
     """The study of the spec in a request's body; raises SpecError."""
-    return parse_spec(with_start(library.store, body.data()))
+    return parse_spec(completed(library.store, body.data()))
 
 
 def extended_study(library: Library, study_id: str, body: Body, warnings: Sequence[WarningText] = ()) -> ParsedSpec:
@@ -207,7 +207,7 @@ def schedule_fields(data: object, library: Library, now: datetime, old: Schedule
     """
     if isinstance(data, Mapping) and "spec" in data:
         try:
-            data = {**data, "spec": with_start(library.store, data["spec"])}
+            data = {**data, "spec": completed(library.store, data["spec"])}
         except SpecError as error:
             raise SpecError(replace(fault, where=f"/spec{fault.where}") for fault in error.faults) from error
     return read_fields(data, now) if old is None else change_fields(old, data, now)

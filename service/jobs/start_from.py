@@ -1,4 +1,6 @@
-"""Starts from the end of a case of another study: replaced by initial values when a study is submitted."""
+"""What a spec names of a service, replaced when a study is submitted: the end of a case of another study, from which it
+starts, by initial values, and components by their fields.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from sprag_study.sentences import Sentence
 from sprag_study.service.reading.limits import span
+from sprag_study.service.spec.component_axes import with_fields
 from sprag_study.service.spec.fields import base_pointer
 from sprag_study.service.spec.machine.drive import START, START_AT
 from sprag_study.service.spec.machine.shaft_check import NotCompiledError, compiles_here
@@ -50,6 +53,19 @@ def with_start(store: Store, data: Any) -> Any:
     _check_pendulums(report, new, values)
     report.raise_if_any()
     return {**data, "base": new}
+
+
+def completed(store: Store, data: Any) -> Any:
+    """The spec ``data`` with what it names of a service: components, and the case that it goes on from.
+
+    Raises as `with_start`.
+    """
+    return with_start(store, with_components(store, data))
+
+
+def with_components(store: Store, data: Any) -> Any:
+    """The spec ``data`` with the fields of the components that it names; raises SpecError."""
+    return with_fields(data, lambda: [record.component for record in store.components.all()])
 
 
 def _source(node: Node, store: Store, spec: Mapping[str, Any]) -> tuple[Study, int] | None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag_study.sentences import Amount, Sentence, joined
+from sprag_study.sentences import Amount, Named, Sentence, joined
 from sprag_study.service.reading.texts import did_you_mean
 from sprag_study.worker.models import Parameter, ResultInfo
 from sprag_study.worker.models.parameters import parameter_of, placed
@@ -50,19 +50,23 @@ def unknown_result(infos: Iterable[ResultInfo], name: str) -> Sentence:
 
 def axes_json(study: Study) -> list[AxisInfo]:
     """The axes of a study as JSON data, without the full lists of values."""
-    shown = [(axis, shown_values(study, axis)) for axis in study.axes]
-    return [
-        {
-            "paths": list(axis.paths),
-            "unit": unit_of(study, axis.paths[0]),
-            "values": values.size,
-            "first": float(values[0]),
-            "last": float(values[-1]),
-            "least": float(values.min()),
-            "largest": float(values.max()),
-        }
-        for axis, values in shown
-    ]
+    return [_axis_json(study, axis) for axis in study.axes]
+
+
+def _axis_json(study: Study, axis: Axis) -> AxisInfo:
+    values, unit = shown_values(study, axis), unit_of(study, axis.paths[0])
+    info: AxisInfo = {
+        "paths": list(axis.paths),
+        "unit": unit,
+        "values": values.size,
+        "first": float(values[0]),
+        "last": float(values[-1]),
+        "least": float(values.min()),
+        "largest": float(values.max()),
+    }
+    if isinstance(unit, Named):
+        info["names"] = [unit.names[int(value)] for value in values.tolist()]
+    return info
 
 
 def shown_values(study: Study, axis: Axis) -> NDArray[np.float64]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from sprag_study.sentences import Named, name_of
 from sprag_study.service.reading.catalogue import unit_of
 from sprag_study.worker import models
 from sprag_study.worker.directions import SWEEP, direction
@@ -18,26 +19,42 @@ if TYPE_CHECKING:
     from sprag_study.worker.study import Study
 
 
-def in_words(values: Mapping[str, float]) -> dict[str, Value]:
-    """Values of parameters by path, that of the direction in words."""
-    return {path: direction(value) if path == SWEEP else value for path, value in values.items()}
+def in_words(values: Mapping[str, float], units: Mapping[str, str]) -> dict[str, Value]:
+    """Values of parameters by path, that of the direction in words, that of a component by its name.
+
+    ``units`` are those of the paths, by which components are known.
+    """
+    return {path: _in_words(path, value, units.get(path, "1")) for path, value in values.items()}
+
+
+def _in_words(path: str, value: float, unit: str) -> Value:
+    if path == SWEEP:
+        return direction(value)
+    name = name_of(value, unit)
+    return value if name is None else name
+
+
+def is_named(study: Study, path: str) -> bool:
+    """Whether the values of a path are words in answers and files: those of directions and of components."""
+    return path == SWEEP or isinstance(unit_of(study, path), Named)
 
 
 def ends_in_words(axis: AxisInfo) -> tuple[Value, Value]:
     """The least and the largest value of an axis, whatever their order."""
     ends = (axis["least"], axis["largest"])
-    least, largest = (in_words({axis["paths"][0]: end})[axis["paths"][0]] for end in ends)
+    least, largest = (_in_words(axis["paths"][0], end, axis["unit"]) for end in ends)
     return least, largest
 
 
 def case_values(study: Study, case: int) -> dict[str, Value]:
     """The parameters that a case has for itself."""
-    return in_words(study.case_parameters(case))
+    values = study.case_parameters(case)
+    return in_words(values, {path: unit_of(study, path) for path in values})
 
 
 def case_units(study: Study) -> dict[str, str]:
-    """SI unit of each of those parameters except the direction of a sweep, and of each number among the results."""
-    units = {path: unit_of(study, path) for path in study.column_paths if path != SWEEP}
+    """SI unit of each of those parameters that is a number, and of each number among the results."""
+    units = {path: unit_of(study, path) for path in study.column_paths if not is_named(study, path)}
     return units | {info.name: info.unit for info in models.study_results(study) if info.kind != "category"}
 
 
@@ -46,7 +63,8 @@ def value_columns(
 ) -> dict[str, list[float] | list[str]]:
     """The same of many cases: a list for each of the study's column paths, in their order."""
     columns = study.columns(cases)
-    return {
-        path: [direction(value) for value in columns[path].tolist()] if path == SWEEP else columns[path].tolist()
-        for path in study.column_paths
-    }
+    found: dict[str, list[float] | list[str]] = {}
+    for path in study.column_paths:
+        values, unit = columns[path].tolist(), unit_of(study, path)
+        found[path] = [str(_in_words(path, value, unit)) for value in values] if is_named(study, path) else values
+    return found

@@ -14,7 +14,20 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 from markupsafe import Markup
 
-from sprag_study.sentences import Amount, Clause, Name, Part, Place, Sentence, Typed, WarningText, Whole, filled, whole
+from sprag_study.sentences import (
+    Amount,
+    Clause,
+    Name,
+    Part,
+    Place,
+    Sentence,
+    Typed,
+    WarningText,
+    Whole,
+    filled,
+    name_of,
+    whole,
+)
 from sprag_study.service.fault_meanings import WARNING_MEANINGS
 from sprag_study.service.faults import refused
 from sprag_study.service.languages import ENGLISH, _, current, decimal, earlier, gettext, language, ngettext
@@ -138,6 +151,8 @@ def _said(part: Part, reading: Reading | None) -> str:
 def _printed(amount: Amount, reading: Reading | None = None) -> str:
     """An amount as in print, in the units of a reader; without one, in its own unit."""
     value, unit = amount.value, amount.unit
+    if (name := name_of(value, unit)) is not None:
+        return name
     if reading is not None:
         if not amount.bare:
             return reading.quantity(value, unit, amount.digits)

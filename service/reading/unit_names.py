@@ -17,7 +17,7 @@ from sprag_study.service.languages import N_
 #: Twice pi to 50 digits, so that its rounding never affects a double.
 TWO_PI: Final = "6.2831853071795864769252867665590057683943387987502"
 
-DEFINITIONS: Final = (
+_PHYSICAL: Final = (
     "percent = 0.01 = %",
     *("nano- = 1e-9 = n-", "micro- = 1e-6 = µ- = u-", "milli- = 1e-3 = m-", "centi- = 1e-2 = c-", "deci- = 1e-1 = d-"),
     *("kilo- = 1e3 = k-", "mega- = 1e6 = M-", "giga- = 1e9 = G-"),
@@ -56,6 +56,17 @@ DEFINITIONS: Final = (
         "newton_centimeter_second = newton_centimeter * second = Ncms",
         "newton_millimeter_second = newton_millimeter * second = Nmms",
     ),
+)
+
+#: Units of money. No rate changes one into another.
+CURRENCIES: Final = {
+    "EUR": "euro", "UAH": "hryvnia", "USD": "us_dollar", "GBP": "pound_sterling", "CHF": "swiss_franc", "PLN": "zloty",
+    "CZK": "czech_koruna",
+}  # fmt: skip
+
+DEFINITIONS: Final = (
+    *_PHYSICAL,
+    *(f"{name} = [{name}] = {symbol}" for symbol, name in CURRENCIES.items()),
 )
 
 #: Prefixes that a symbol has. Others, such as those of Mm, Grad and mt, are more often something else.

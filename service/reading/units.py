@@ -20,7 +20,7 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
-from sprag_study.sentences import Amount, Sentence, Typed, joined, plural
+from sprag_study.sentences import Amount, Named, Sentence, Typed, joined, plural
 from sprag_study.service.faults import ClauseError, Code
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.cyrillic import latin
@@ -146,6 +146,8 @@ def parse_quantity(value: object, unit: str) -> float:
 
 def parse_exact(value: object, unit: str) -> Fraction:
     """As `parse_quantity`, but exact: the decimal number as written, times the exact factor of its unit."""
+    if isinstance(unit, Named):
+        return Fraction(_named_number(value, unit.names))
     if isinstance(value, str) and unit == "1":
         number, text = split_quantity(value)
         if text in PERCENT:
@@ -168,6 +170,13 @@ def parse_exact(value: object, unit: str) -> Fraction:
             )  # fmt: skip
         return number * _factor(text, unit)
     return exact_number(value, unit)
+
+
+def _named_number(value: object, names: tuple[str, ...]) -> int:
+    """The number that stands for a name; QuantityError where it is none of them."""
+    if isinstance(value, str) and value.strip() in names:
+        return names.index(value.strip())
+    raise QuantityError("invalid-choice", Sentence("is none of the components {names}", names=", ".join(names)))
 
 
 def exact_number(value: object, unit: str) -> Fraction:
@@ -193,6 +202,8 @@ def exact_number(value: object, unit: str) -> Fraction:
 
 def typed_value(text: str, unit: str) -> float:
     """The value (SI) of a text that is in ``unit`` where it has no unit of its own; QuantityError."""
+    if isinstance(unit, Named):
+        return parse_quantity(text, unit)
     number, own = split_quantity(text)
     return parse_quantity(text, unit) if own else to_float(number)
 

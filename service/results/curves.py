@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -105,9 +105,12 @@ class Curve:
         """Indices of the cases that were run, ascending, which a picture joins; of a coarser study, its own points."""
         return np.flatnonzero(~not_run(self.endings))
 
-    def fixed(self) -> dict[str, list[Any]]:
-        """Columns of a table with a row for each case: its fixed parameters in words, and its number."""
-        given = in_words({**self.line.by, **self.line.at})
+    def fixed(self, units: Mapping[str, str]) -> dict[str, list[Any]]:
+        """Columns of a table with a row for each case: its fixed parameters in words, and its number.
+
+        ``units`` are those of the paths.
+        """
+        given = in_words({**self.line.by, **self.line.at}, units)
         cases = self.line.cases.tolist()
         return {**{path: [value] * len(cases) for path, value in given.items()}, "case": cases}
 
@@ -116,11 +119,11 @@ class Curve:
         flags = flag_names(self.flags or [""] * len(self.endings))
         return {"flags": [" ".join(names) for names in flags], "ending": self.endings}
 
-    def to_json(self, results: Sequence[ResultInfo]) -> CurveData:
-        """The curve as JSON data."""
+    def to_json(self, results: Sequence[ResultInfo], units: Mapping[str, str]) -> CurveData:
+        """The curve as JSON data; ``units`` are those of its paths."""
         data: CurveData = {
-            "by": in_words(self.line.by),
-            "at": in_words(self.line.at),
+            "by": in_words(self.line.by, units),
+            "at": in_words(self.line.at, units),
             "x": list(self.line.x),
             "cases": self.line.cases.tolist(),
             "y": {info.name: numbers(self.y[info.name], info.kind == "count") for info in results},
@@ -153,7 +156,7 @@ class Curves:
             "x": {"path": chosen.x, "unit": chosen.units[chosen.x], "values": list(chosen.x_values)},
             "units": chosen.units,
             "results": {info.name: filled(ResultMeaning, info) for info in chosen.results},
-            "curves": [curve.to_json(chosen.results) for curve in self.curves],
+            "curves": [curve.to_json(chosen.results, chosen.units) for curve in self.curves],
         }
         return data if chosen.plan is None else {**data, "error_asked": chosen.plan.error}
 
@@ -222,7 +225,7 @@ class Map:
                 MapResult, self.result, values=[numbers(row, self.result.kind == "count") for row in self.values]
             ),
             "units": {self.x: self.units[0], self.y: self.units[1], **self.at_units},
-            "at": in_words(self.at),
+            "at": in_words(self.at, self.at_units),
             "cases": self.cases.tolist(),
             "endings": self.endings,
         }

@@ -78,7 +78,7 @@ def _tables(drawn: Sequence[tuple[str, Curves]]) -> Iterator[dict[str, list[Any]
             points = len(curve.endings)
             yield {
                 "study": [label] * points,
-                **curve.fixed(),
+                **curve.fixed(curves.selection.units),
                 curves.selection.x: list(curve.line.x),
                 **{info.name: curve.y[info.name].tolist() for info in curves.selection.results},
                 **({} if curve.regimes is None else {"regime": curve.regimes}),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 
-from sprag_study.sentences import Amount, Name
+from sprag_study.sentences import Amount, Name, Named
 from sprag_study.service import exports
 from sprag_study.service.answers.goals import (
     Counted,
@@ -23,6 +23,7 @@ from sprag_study.service.faults import Fault, FaultError
 from sprag_study.service.json_text import numbers
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.directions import in_words
 from sprag_study.service.reading.reader import Phrase, term
 from sprag_study.service.results.explore import Further
 from sprag_study.service.results.regimes import kind_columns
@@ -46,7 +47,7 @@ if TYPE_CHECKING:
     from sprag_study.worker.arrays import Bools, Floats, Ints
     from sprag_study.worker.models import ResultInfo
     from sprag_study.worker.planning.goals import Front
-    from sprag_study.worker.planning.goals.plan import Goal, Limit
+    from sprag_study.worker.planning.goals.plan import Goal, Limit, Variable
     from sprag_study.worker.study import Study
 
 #: Designs that are answered unless more are asked for.
@@ -248,17 +249,21 @@ def front_json(study_id: str, found: Designs, limit: int = DESIGNS) -> FrontRepo
 
 
 def _variables(found: Designs) -> list[DesignVariable]:
-    return [
-        {
-            "name": one.paths[0],
-            "paths": list(one.paths),
-            "unit": unit_of(found.study, one.paths[0]),
-            "low": one.low,
-            "high": one.high,
-            "values": list(one.values),
-        }
-        for one in found.plan.vary
-    ]
+    return [_variable(one, unit_of(found.study, one.paths[0])) for one in found.plan.vary]
+
+
+def _variable(one: Variable, unit: str) -> DesignVariable:
+    described: DesignVariable = {
+        "name": one.paths[0],
+        "paths": list(one.paths),
+        "unit": unit,
+        "low": one.low,
+        "high": one.high,
+        "values": list(one.values),
+    }
+    if isinstance(unit, Named):
+        described["names"] = [unit.names[int(value)] for value in one.values]
+    return described
 
 
 def _limit(limit: Limit, info: ResultInfo) -> DesignLimit:
@@ -277,12 +282,13 @@ def design_json(found: Designs, position: int) -> Design:
     """The design at a position."""
     ranked, record = found.front, found.rounds[found.round[position]]
     names = [one.paths[0] for one in found.plan.vary]
+    units = {name: unit_of(found.study, name) for name in names}
     return {
         "design": int(found.numbers[position]),
         "cases": ranked.cases[position].tolist(),
         "round": record.round + 1,
         "phase": "polish" if record.summary.get("phase") == "polish" else "search",
-        "variables": dict(zip(names, ranked.variables[position].tolist(), strict=True)),
+        "variables": in_words(dict(zip(names, ranked.variables[position].tolist(), strict=True)), units),
         "goals": dict(zip((goal.name for goal in found.plan.best), numbers(ranked.goals[position] + 0.0), strict=True)),
         "results": {
             name: [found.infos[name].cell(value) for value in column[position].tolist()]

@@ -93,8 +93,8 @@ def _interval(found: AnswerFacts) -> Phrase:
 def report(study_id: str, study: Study, found: StudyAnswers) -> AnswerReport:
     """The answers as the API gives them."""
     x = None if found.query is None else found.query.x
-    curves = [_curve(one, found) for one in found.curves]
-    units = {path: unit_of(study, path) for one in curves for path in (*one["by"], *one["at"])}
+    units = _units_of(study, found)
+    curves = [_curve(one, found, units) for one in found.curves]
     units |= {path: unit_of(study, path) for path in study.axis_paths} if found.overall else {}
     return {
         "study": study_id,
@@ -107,10 +107,15 @@ def report(study_id: str, study: Study, found: StudyAnswers) -> AnswerReport:
     }
 
 
-def _curve(one: CurveAnswers, found: StudyAnswers) -> CurveAnswer:
+def _units_of(study: Study, found: StudyAnswers) -> dict[str, str]:
+    """SI units of what curves are told apart by and held at."""
+    return {path: unit_of(study, path) for one in found.curves for path in (*one.line.by, *one.line.at)}
+
+
+def _curve(one: CurveAnswers, found: StudyAnswers, units: Mapping[str, str]) -> CurveAnswer:
     return {
-        "by": in_words(one.line.by),
-        "at": in_words(one.line.at),
+        "by": in_words(one.line.by, units),
+        "at": in_words(one.line.at, units),
         "answers": [answer_json(item, found.unit) for item in one.answers],
         "working_point": [answer_json(item, found.unit) for item in one.working_point],
     }
@@ -150,10 +155,11 @@ def answers_csv(study: Study, found: StudyAnswers, reading: Reading) -> bytes:
 
 
 def _rows(study: Study, found: StudyAnswers, reading: Reading) -> Iterator[dict[str, Any]]:
+    units = _units_of(study, found)
     for one in found.curves:
         for part, items in (("curve", one.answers), ("working point", one.working_point)):
             for item in items:
-                place = in_words({**one.line.by, **one.line.at})
+                place = in_words({**one.line.by, **one.line.at}, units)
                 yield {"of": part, **_place(study, place, reading), **_shown(item, found.unit, reading)}
     for item in found.overall:
         place = {} if item.case is None else case_values(study, item.case)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag_study.sentences import Amount
+from sprag_study.sentences import Amount, Named
 from sprag_study.service.languages import _
 from sprag_study.service.reading.catalogue import axes_json, shown_values, unit_of
 from sprag_study.service.reading.reader import CODES, Phrase, joined, plural, term
@@ -65,7 +65,7 @@ def varied(study: Study) -> Iterator[tuple[tuple[str, ...], Text]]:
             values = shown_values(study, own).tolist()
             text = (
                 plural("{ends}, {count} value", "{ends}, {count} values", len(values), ends=text)
-                if is_even(values)
+                if is_even(values) and not isinstance(axis["unit"], Named)
                 else listed(values, axis["unit"])
             )
         yield tuple(axis["paths"]), text

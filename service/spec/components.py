@@ -5,6 +5,7 @@ A component has a kind, a name that is unique within the kind, and fields with q
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -19,7 +20,8 @@ from sprag_study.service.reading.limits import characters
 from sprag_study.service.reading.numbers import parse_number, settled
 from sprag_study.service.reading.printed import could_be_several, could_be_values
 from sprag_study.service.reading.together import AMBIGUOUS_UNIT, questions
-from sprag_study.service.reading.units import QuantityError, has_unit
+from sprag_study.service.reading.unit_names import CURRENCIES
+from sprag_study.service.reading.units import QuantityError, has_unit, split_quantity, to_float
 from sprag_study.service.spec.csv_text import Column, in_cell, read_csv, refuse_mixed_column, unescape
 from sprag_study.service.spec.described import Record
 from sprag_study.service.spec.labels import LINES_ALLOWED, printable_lines
@@ -37,6 +39,13 @@ _KINDS: Final = {kind.name: (model.name, kind) for model in all_models() for kin
 KINDS: Final = tuple(_KINDS)
 #: Field of a clutch with a list.
 COEFFICIENTS: Final = "coefficients"
+#: Numbers of a component of any kind that are no parameters of a machine.
+PRICE: Final = "price"
+MASS: Final = "mass"
+NUMBERS: Final[Mapping[str, models.Parameter]] = {
+    PRICE: models.Parameter(PRICE, "", "1", 0.0, math.inf, False, None, "price of one, with its currency"),
+    MASS: models.Parameter(MASS, "", "kg", 0.0, math.inf, False, None, "mass of one"),
+}
 #: What every component has beside its fields.
 COLUMNS: Final = ("kind", "name", "note")
 #: Columns of a CSV file that are no numbers.
@@ -93,16 +102,61 @@ def model_of_kind(name: str) -> str:
 
 @lru_cache(maxsize=8)
 def fields_of(kind: str) -> Mapping[str, models.Parameter | None]:
-    """The fields of a kind by name, with their parameters; None for its choice."""
+    """The fields of a kind by name, with their parameters, `NUMBERS` last; None for its choice."""
     model, own = _KINDS[kind]
     catalogue = {entry.path.removesuffix(".K"): entry for entry in models.parameter_catalogue(model)}
-    return {name: catalogue.get(place.replace("/", ".")) for name, place in own.fields.items()}
+    return {**{name: catalogue.get(place.replace("/", ".")) for name, place in own.fields.items()}, **NUMBERS}
 
 
 def needed(kind: str, fields: Mapping[str, str]) -> tuple[str, ...]:
     """The fields that a component must have."""
     own = kind_of(kind)
     return (*own.required, *own.ways.get(fields.get(own.choice, ""), ()))
+
+
+def price_of(text: str) -> tuple[float, str]:
+    """A price and its currency; the unit is "1" where it has none.
+
+    Raises
+    ------
+    QuantityError
+        Where it is no number, negative, or has the unit of anything but money.
+    """
+    number, unit = split_quantity(text)
+    if unit and unit not in CURRENCIES:
+        raise QuantityError("wrong-unit", Sentence("has the unit '{unit}', which is no currency", unit=unit))
+    value = to_float(number)
+    if value < 0.0:
+        raise QuantityError("out-of-range", "is out of range")
+    return value, unit or "1"
+
+
+def si_fields(component: Component) -> dict[str, float | list[float] | str]:
+    """The fields of a sound component in SI numbers, without its `NUMBERS`; its choice as it is."""
+    values: dict[str, float | list[float] | str] = {}
+    for name, text in component.fields.items():
+        parameter = fields_of(component.kind)[name]
+        if parameter is None:
+            values[name] = text
+        elif name == COEFFICIENTS:
+            places = [placed(parameter, f"{COEFFICIENTS}.{index}") for index in range(models.MAX_COEFFICIENTS)]
+            values[name] = [_si(item, one) for item, one in zip(list_text(text), places, strict=False)]
+        elif name not in NUMBERS:
+            values[name] = _si(text, parameter)
+    return values
+
+
+def number_of(component: Component, name: str) -> tuple[float, str] | None:
+    """One of the `NUMBERS` of a component (SI) with its unit; None where it has none."""
+    text = component.fields.get(name)
+    if text is None:
+        return None
+    return price_of(text) if name == PRICE else (_si(text, NUMBERS[name]), NUMBERS[name].unit)
+
+
+def _si(text: str, parameter: models.Parameter) -> float:
+    number = parse_number(text)
+    return to_float(exact(text if number is None else number, parameter))
 
 
 def list_text(text: str) -> list[str]:
@@ -195,9 +249,20 @@ def faults_of(kind: str, fields: Mapping[str, str]) -> list[Fault]:
     return found
 
 
+def _faults_of_price(text: str) -> list[Fault]:
+    try:
+        price_of(text)
+    except QuantityError as error:
+        allowed = Sentence("a number of at least 0, with {currencies} or no unit", currencies=", ".join(CURRENCIES))
+        return [Fault(PRICE, error.code, error.message, text, allowed)]
+    return []
+
+
 def _faults_of_field(kind: str, name: str, text: str) -> list[Fault]:
     parameter = fields_of(kind)[name]
     assert parameter is not None
+    if name == PRICE:
+        return _faults_of_price(text)
     if name != COEFFICIENTS:
         pairs = [(text, parameter)]
     elif could_be_several(text) or could_be_values(list_text(text)) is not None:
@@ -238,7 +303,8 @@ def _read_csv(node: Node) -> list[tuple[str, Component]]:
                 "unknown-field", "is a column twice" if name in known else "has a column that is no field", cell,
                 allowed=", ".join(sorted(known)),
             )  # fmt: skip
-    parameters = {name: one for kind in KINDS for name, one in fields_of(kind).items() if name != COEFFICIENTS}
+    parameters = {name: one for kind in KINDS for name, one in fields_of(kind).items()}
+    del parameters[COEFFICIENTS], parameters[PRICE]
     for place, (name, unit) in enumerate(headings):
         parameter = parameters.get(name)
         if parameter is not None and not unit:

@@ -247,7 +247,7 @@ def _is_ordered(formulas: Mapping[str, Formula], given: Mapping[str, Node]) -> b
 
 def layout(machine: Machine, axes: tuple[Axis, ...], combine: Combine) -> Study:
     """The cases of a machine that could be read, with neither model nor run."""
-    return Study("", "", machine.values, {}, axes, combine, derive=machine.derive)
+    return Study("", "", machine.values, {}, axes, combine, derive=machine.derive, components=machine.components)
 
 
 def check_derived(report: Report, derive: object, machine: Machine, study: Study, *, ranges: bool = False) -> None:

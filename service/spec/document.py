@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any, Final
 from sprag_study.sentences import Sentence
 from sprag_study.service.reading.limits import characters, quoted
 from sprag_study.service.reading.texts import did_you_mean
-from sprag_study.service.spec.derive import DERIVE, check_derived, layout, read_machine
+from sprag_study.service.spec.component_axes import read_with_components
+from sprag_study.service.spec.derive import DERIVE, check_derived, layout
 from sprag_study.service.spec.described import Record
 from sprag_study.service.spec.kinds.draft import Draft
 from sprag_study.service.spec.kinds.registry import CASES, WITH_CASES
@@ -116,7 +117,7 @@ def parse_spec(data: object, told: Sequence[str] = ()) -> ParsedSpec:
     if model is None:
         raise report.error()
     part = part_of(model)
-    report.machine = machine = read_machine(spec, part)
+    report.machine = machine = read_with_components(spec, part)
     draft = Draft(spec, model, name)
     steps = [CASES.read(draft)]
     axes, combine = draft.axes, draft.combine

@@ -13,7 +13,7 @@ from sprag_study.service.faults import Fault
 from sprag_study.service.reading.texts import quantity_text
 from sprag_study.service.spec.axes.axes import AXIS, axis_values
 from sprag_study.service.spec.axes.design import ANYTHING
-from sprag_study.service.spec.derive import read_machine
+from sprag_study.service.spec.component_axes import COMPONENT, axis_item, read_with_components
 from sprag_study.service.spec.described import Described, Listed, Record
 from sprag_study.service.spec.document import ParsedSpec, parse_spec
 from sprag_study.service.spec.fields import renamed
@@ -113,8 +113,7 @@ def extended_spec(
     places = without_drives(study)
     own: list[dict[str, Any]] = [
         {
-            "path": list(axis.paths),
-            "values": list(axis.values),
+            **axis_item(spec, study, axis, axis.values),
             **(sweep_of(study) if study.sweep in axis.paths else {}),
         }
         for axis in places.axes
@@ -126,7 +125,7 @@ def extended_spec(
     if study.combine != "grid":
         root["axes"].refuse("conflict", "the axes of this study are zipped", None, allowed="`cases` instead")
         raise root.report.error()
-    root.report.machine = read_machine(Node(Report(), "", spec), part_of(study.model))
+    root.report.machine = read_with_components(Node(Report(), "", spec), part_of(study.model))
     for item in items:
         _add(item, places, own)
     root.report.raise_if_any()
@@ -174,6 +173,10 @@ def _read_addition(root: Node, study: Study) -> tuple[list[Node], str]:
 
 def _add(item: Node, study: Study, axes: list[dict[str, Any]]) -> None:
     """Add the values of one item to the axis of its paths; create the axis where it is missing."""
+    if COMPONENT in item:
+        item[COMPONENT].refuse("conflict", "components cannot be added to a study", None,
+                               allowed="a new study with all of them: it reuses the cases of this one")  # fmt: skip
+        return
     read = axis_values(item)
     if read is None:
         return

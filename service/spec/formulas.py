@@ -19,6 +19,7 @@ from sprag_study.service.faults import ClauseError
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.cyrillic import latin
 from sprag_study.service.reading.quantities import KINDS
+from sprag_study.service.reading.unit_names import CURRENCIES
 from sprag_study.service.reading.units import PERCENT, QuantityError, is_unit, measure, plain_signs, to_float
 from sprag_study.worker.models.formulas import MAX_LENGTH, RESERVED, Expression, ExpressionError, Node
 
@@ -431,7 +432,9 @@ def _hint(one: Powers, other: Powers) -> Sentence:
 
 def _text(unit: Powers) -> Sentence | Typed:
     """A unit for a message, such as "kg*m^2/s"."""
-    names = {"gram": "kg", "meter": "m", "second": "s", "radian": "rad"}
+    names = {"gram": "kg", "meter": "m", "second": "s", "radian": "rad"} | {
+        name: symbol for symbol, name in CURRENCIES.items()
+    }
     present = [(names[name], (unit or {}).get(name, Fraction())) for name in names]
 
     def powers(sign: int) -> list[str]:

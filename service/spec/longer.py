@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag_study.service.spec.axes.blocks import as_axes, chosen, first_rows
+from sprag_study.service.spec.component_axes import axis_item, keeps_components, with_base
 from sprag_study.service.spec.fields import renamed
 from sprag_study.service.spec.kinds.registry import without_cases
 from sprag_study.service.spec.run import SETTLED_FIELDS, TIMED_FIELDS
@@ -54,7 +55,8 @@ def longer_spec(
         run |= _longer_run(study, at_most)
     if study.sweep is not None:  # every case depends on those before it in its line
         return {**spec, "name": renamed(study.name, _SUFFIX), "run": run}
-    axes = [{"path": list(axis.paths), "values": axis.array.tolist()} for axis in _listed(study, cases)]
+    axes = [axis_item(spec, study, axis, axis.values) for axis in _listed(study, cases)]
+    spec = spec if keeps_components(study) else with_base(spec)
     return {**without_cases(spec), "name": renamed(study.name, _SUFFIX), "run": run, "combine": "zip", "axes": axes}
 
 
@@ -63,7 +65,8 @@ def _listed(study: Study, cases: NDArray[np.int64]) -> tuple[Axis, ...]:
     columns = study.columns(cases)
     if study.spread is None:
         return tuple(Axis(axis.paths, columns[axis.paths[0]]) for axis in study.axes)
-    own = {path: column for path, column in columns.items() if path not in {DRIVE, *study.derive}}
+    apart = {DRIVE, *study.derive, *(study.component_paths if keeps_components(study) else study.beside)}
+    own = {path: column for path, column in columns.items() if path not in apart}
     return as_axes(chosen(own, first_rows(own)))
 
 

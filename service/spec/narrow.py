@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sprag_study.service.spec.axes.axes import SWEPT
+from sprag_study.service.spec.component_axes import axis_item
 from sprag_study.service.spec.fields import renamed
 from sprag_study.service.spec.kinds.registry import without_cases
 from sprag_study.service.spec.kinds.sweep import sweep_of
@@ -76,12 +77,12 @@ def narrowed_spec(
     jumps, swept, last = jumped_over(study, cases), swept_axis(study), len(study.axes) - 1
     axes = []
     for position, axis in enumerate(study.axes[:-1]):
-        own: dict[str, Any] = {"path": list(axis.paths), "values": axis.array.tolist()}
+        values = axis.array
         if position in fixed:
-            own["values"] = [axis.value(fixed[position])]
+            values = axis.array[fixed[position] : fixed[position] + 1]
         elif position == swept:
-            own["values"] = narrowed_values(axis.array, jumps, steps).tolist()
-        axes.append(own)
+            values = narrowed_values(axis.array, jumps, steps)
+        axes.append(axis_item(spec, study, axis, values.tolist()))
     one = {SWEPT.name: DIRECTIONS[int(study.axes[last].value(fixed[last]))]} if last in fixed else sweep_of(study)
     axes[swept] |= one
     return {**without_cases(spec), "name": renamed(study.name, _SUFFIX), "combine": "grid", "axes": axes}

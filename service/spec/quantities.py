@@ -153,9 +153,10 @@ def _units_of(draft: Draft, infos: Sequence[ResultInfo]) -> dict[str, str]:
     """SI unit of every name that a formula may use: numbers that each case has, by path, and results."""
     machine = draft.spec.machine
     varied = {path for axis in draft.axes or () for path in axis.paths}
-    known = {*machine.values, *machine.derive, *varied}
+    of_components = {path: unit for one in machine.components for path, unit in one.units.items()}
+    known = {*machine.values, *machine.derive, *varied} - {one.path for one in machine.components}
     units = {path: entry.unit for path, entry in machine.parameters.items() if path in known}
-    return units | {info.name: str(info.unit) for info in infos if info.kind != "category"}
+    return units | of_components | {info.name: str(info.unit) for info in infos if info.kind != "category"}
 
 
 def _quantity(

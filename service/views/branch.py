@@ -28,7 +28,7 @@ from sprag_study.worker import models
 from sprag_study.worker.directions import SWEEP
 from sprag_study.worker.models.abilities import branch_results, run_branch
 from sprag_study.worker.models.branches import Along, CaseBranch
-from sprag_study.worker.models.common import NO_PARAMETERS, case_machine
+from sprag_study.worker.models.common import case_machine
 from sprag_study.worker.models.parameters import allowed_values
 from sprag_study.worker.models.vibration_drive.start_states import is_initial
 
@@ -48,7 +48,7 @@ _OUTSIDE = N_("outside the range of the parameter")
 
 def ranged_axes(study: Study, *, initial: bool = False) -> list[str]:
     """Paths of the axes along which a case can be followed, with the initial values if ``initial``."""
-    axes = [axis for axis in study.axes if NO_PARAMETERS.isdisjoint(axis.paths) and np.ptp(axis.array) > 0.0]
+    axes = [axis for axis in study.axes if study.beside.isdisjoint(axis.paths) and np.ptp(axis.array) > 0.0]
     return [axis.paths[0] for axis in axes if initial or not any(map(is_initial, axis.paths))]
 
 

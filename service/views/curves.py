@@ -119,7 +119,7 @@ class CurvesView(StudyView[CurvesQuestion, CurveQuery, Curves]):
         names, infos = kind_columns(curves.selection.regime), curves.selection.results
         columns = exports.stacked(
             {
-                **curve.fixed(),
+                **curve.fixed(answer.result.selection.units),
                 curves.selection.x: list(curve.line.x),
                 **{info.name: numbers(curve.y[info.name], info.kind == "count") for info in infos},
                 **dict(zip(names, (curve.regimes or [], curve.orders or []), strict=False)),

@@ -62,7 +62,9 @@ def test_a_csv_file_has_units_in_its_headings() -> None:
         ({"fields": {"spring_rate": "9 N"}}, "/components/0/fields/spring_rate", "wrong-unit"),
         ({"fields": {"spring_rate": "-9 N/m"}}, "/components/0/fields/spring_rate", "out-of-range"),
         ({"fields": {"spring_rate": "1,234 N/m"}}, "/components/0/fields/spring_rate", "ambiguous-comma"),
-        ({"fields": {"spring_rate": "9 N/m", "mass": "1 kg"}}, "/components/0/fields/mass", "unknown-field"),
+        ({"fields": {"spring_rate": "9 N/m", "length": "1 m"}}, "/components/0/fields/length", "unknown-field"),
+        ({"fields": {"spring_rate": "9 N/m", "price": "4 kg"}}, "/components/0/fields/price", "wrong-unit"),
+        ({"fields": {"spring_rate": "9 N/m", "price": "-4 EUR"}}, "/components/0/fields/price", "out-of-range"),
         ({"fields": {"spring_rate": 9}}, "/components/0/fields", "wrong-type"),
         ({"colour": "red"}, "/components/0/colour", "unknown-field"),
     ],
@@ -95,7 +97,7 @@ def test_other_faults(data: dict[str, Any], code: str) -> None:
 
 def test_every_field_of_a_component_is_one_of_the_form() -> None:
     assert [list(fields_of(kind)) for kind in ("spring", "clutch")] == [
-        ["spring_rate", "damping"],
+        ["spring_rate", "damping", "price", "mass"],
         [
             "coefficients",
             "windup_limit",
@@ -104,6 +106,8 @@ def test_every_field_of_a_component_is_one_of_the_form() -> None:
             "rated_frequency",
             "rated_speed",
             "fatigue_exponent",
+            "price",
+            "mass",
         ],
     ]
 

@@ -150,7 +150,7 @@ def run_accepted(task: ChunkTask, run: Callable[[ChunkTask], ChunkResult], endin
 def case_machine(study: Study, case: int) -> dict[str, float]:
     """Every parameter of one case, SI: the base with what the case has for itself. IndexError outside the study."""
     machine = {**study.base, **study.case_parameters(case)}
-    return {path: value for path, value in machine.items() if path not in NO_PARAMETERS}
+    return {path: value for path, value in machine.items() if path not in study.beside}
 
 
 @dataclass(frozen=True, slots=True)

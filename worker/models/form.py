@@ -148,6 +148,8 @@ class ComponentKind:
     twice, foreign, change, keep : what is said of one that is given twice, and of a field that it does not have; texts
         of its part of the page
     sets : further fields of the form that it fills in
+    chosen : path of the choice in the base of a spec
+    replaces : objects of the base that a component stands for as a whole
     """
 
     name: str
@@ -162,6 +164,8 @@ class ComponentKind:
     ways: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     titles: Mapping[str, str] = field(default_factory=dict)
     sets: Mapping[str, str] = field(default_factory=dict)
+    chosen: str = ""
+    replaces: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

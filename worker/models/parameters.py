@@ -39,7 +39,13 @@ def model_parameter(model: str, path: str) -> Parameter | None:
 
 
 def parameter_of(study: Study, path: str) -> Parameter | None:
-    """The parameter at a flat path of a spec, for the machine of ``study``; None when there is none."""
+    """The parameter at a flat path of a spec, for the machine of ``study``; None when there is none.
+
+    Components have one for their number, whose unit is their names, and for their own numbers.
+    """
+    of_components = next((known for one in study.components if (known := one.parameter(path)) is not None), None)
+    if of_components is not None:
+        return of_components
     own = model_of(study.model).parameters_of(study)
     return own.get(path) if own else model_parameter(study.model, path)
 

@@ -51,7 +51,7 @@ def at_start(study: Study, case: int, start: int) -> Study:
     run = {name: value for name, value in study.run.items() if name != STARTS}
     return replace(
         study, base={path: base[path] for path in study.base}, run=run, axes=(), combine="grid", derive={}, spread=None,
-        plan=None,
+        plan=None, components=(),
     )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sprag_study.worker.models.common import NO_PARAMETERS, ChunkResult, ChunkTask, WorkerEnding, run_accepted
+from sprag_study.worker.models.common import ChunkResult, ChunkTask, WorkerEnding, run_accepted
 from sprag_study.worker.models.parameters import refused_cases
 from sprag_study.worker.models.registry import model_of
 from sprag_study.worker.sweeps import lines_of
@@ -20,7 +20,7 @@ def chunk_task(study: Study, first: int, count: int) -> ChunkTask:
     """The cases ``first`` .. ``first + count - 1`` of ``study``, ready for `run_task`; of a sweep whole lines."""
     cases = range(first, first + count)
     columns: dict[str, Any] = {**study.base, **study.columns(cases)}
-    columns = {path: column for path, column in columns.items() if path not in NO_PARAMETERS}
+    columns = {path: column for path, column in columns.items() if path not in study.beside}
     lines = None if study.sweep is None else lines_of(study, np.asarray(cases, dtype=np.int64))
     shape = model_of(study.model).shape_of(study)
     task = ChunkTask(first, count, shape, study.run, columns, study.structure, lines=lines, along=study.sweep)

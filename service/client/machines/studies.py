@@ -69,7 +69,7 @@ class Studies(Draft):
         Parameters
         ----------
         vary : values
-            What may vary: over a range, or among listed values; fields path, from, to, values; needed: path.
+            What may vary: over a range, among listed values, or among components.
         best : values, optional
             Results that are to be as small, or with max as large, as possible.
         subject_to : values, optional

@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sprag_study.sentences import Amount, Place, Sentence, joined
+from sprag_study.service.languages import N_
 from sprag_study.service.reading.catalogue import range_sentence
 from sprag_study.service.reading.limits import at_most, at_most_cases, unit_list
 from sprag_study.service.reading.texts import quantity_text
 from sprag_study.service.spec.axes.blocks import first_rows
-from sprag_study.service.spec.axes.values import PLANS, Plan, any_count, count_text
+from sprag_study.service.spec.axes.values import PLANS, Plan, any_count, count_text, plan_values
+from sprag_study.service.spec.component_axes import COMPONENT
 from sprag_study.service.spec.described import Listed, Record, choice
 from sprag_study.service.spec.report import Report, join
 from sprag_study.service.spec.schema.quantity import QUANTITY, Schema
@@ -132,12 +134,25 @@ def axis_values(node: Node) -> tuple[tuple[str, ...], NDArray[np.float64]] | Non
 
 def read_axis(node: Node) -> tuple[tuple[str, ...] | None, Plan | None]:
     """The paths of one axis and the plan of its values; None for what could not be read."""
+    if COMPONENT in node:
+        return read_components(node)
     if not AXIS.read(node):
         return None, None
     paths, way = read_paths(node["path"]), node.one_of(AXIS.either)
     if way is None or paths is None:
         return paths, None
     return paths, PLANS[way](node[way], node.machine.parameters[paths[0]])
+
+
+def read_components(node: Node) -> tuple[tuple[str, ...] | None, Plan | None]:
+    """As `read_axis`, of an axis of components: its path is their kind, its values are their numbers."""
+    known = next((one for one in node.machine.components if one.path == node[COMPONENT].value), None)
+    if known is None:  # its faults are recorded
+        return None, None
+    if "values" in node:
+        return (known.path,), plan_values(node["values"], node.machine.parameters[known.path])
+    count = len(known.names)
+    return (known.path,), Plan(node["of"], count, lambda: np.arange(count, dtype=np.float64))
 
 
 def read_paths(node: Node) -> tuple[str, ...] | None:
@@ -158,6 +173,9 @@ def read_paths(node: Node) -> tuple[str, ...] | None:
         elif path in machine.derive:
             item.refuse("conflict", "is derived from other parameters, so it cannot vary by itself",
                         allowed="a path without a formula in `derive`")  # fmt: skip
+        elif (kind := machine.component_of(path)) is not None:
+            item.refuse("conflict", Sentence("follows from the component `{kind}`, which varies", kind=kind),
+                        allowed=N_("a path that no component gives"))  # fmt: skip
         elif path in machine.parameters:
             known.append(machine.parameters[path])
         elif node.report.full:

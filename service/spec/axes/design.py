@@ -31,11 +31,12 @@ from sprag_study.service.spec.axes.exclude import kept, read_exclude
 from sprag_study.service.spec.axes.points import POINTS, read_points
 from sprag_study.service.spec.axes.sample import SAMPLE, read_sample
 from sprag_study.service.spec.axes.values import any_count, count_text
+from sprag_study.service.spec.component_axes import COMPONENT_AXIS
+from sprag_study.service.spec.derive import layout
 from sprag_study.service.spec.described import Listed, Record, Variants, choice
 from sprag_study.service.spec.node import Node
 from sprag_study.service.spec.report import Report
 from sprag_study.worker.limits import MAX_AXES, MAX_AXIS_VALUES, MAX_COLUMNS
-from sprag_study.worker.models.formulas import evaluate
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -48,7 +49,7 @@ _COMBINE_HELP: Final = (
     "other, what does not vary being as in the base, each case once"
 )
 COMBINE: Final = choice("combine", _COMBINE_HELP, "grid", "zip", "union", default="grid")
-_IN_GROUP: Final = (AXIS, SAMPLE, POINTS)
+_IN_GROUP: Final = (AXIS, SAMPLE, POINTS, COMPONENT_AXIS)
 #: Of a group, and of whatever is not a plain grid or zip.
 _GROUPED: Final = Listed("axes", 1, MAX_AXES, item=Variants(_IN_GROUP))
 _GROUP: Final = Record({"combine": COMBINE, "axes": _GROUPED}, "a group of axes", required=("axes",))
@@ -80,7 +81,7 @@ def read_design(spec: Node) -> tuple[tuple[Axis, ...] | None, Combine]:
         return None, "zip"
     if conditions:
         count = _length(columns)
-        every = columns | evaluate(machine.derive, machine.values, columns, count)
+        every = layout(machine, as_axes(columns), "zip").columns(range(count))
         columns = chosen(columns, kept(conditions, every, machine.values, count))
         return _as_axes(report, columns, machine, excluded=True), "zip"
     return _as_axes(report, columns, machine, block.lines), "zip"

@@ -63,6 +63,7 @@ class Draft:
         return Study(
             self.model, self.name, base, self.run, self.axes or (), self.combine, machine.structure, self.plan,
             machine.derive, self.spread, self.sweep, self.quantities,
+            machine.components,
         )  # fmt: skip
 
 

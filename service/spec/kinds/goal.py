@@ -9,8 +9,9 @@ from sprag_study.sentences import Amount, Place, Sentence, joined, plural
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.limits import at_most_cases, span
 from sprag_study.service.reading.texts import did_you_mean
-from sprag_study.service.spec.axes.axes import PATHS, check_paths, expand
+from sprag_study.service.spec.axes.axes import PATHS, check_paths, expand, read_components
 from sprag_study.service.spec.axes.values import plan_values
+from sprag_study.service.spec.component_axes import COMPONENT, COMPONENT_AXIS
 from sprag_study.service.spec.described import Described, Listed, Record, Variants, choice
 from sprag_study.service.spec.kinds.draft import Kind
 from sprag_study.service.spec.kinds.fields import (
@@ -86,7 +87,8 @@ _CONSTRAINT: Final = Variants((
 ))  # fmt: skip
 GOAL: Final = Record(
     {
-        "vary": Listed("variables", 1, 64, "what may vary: over a range, or among listed values", item=_VARIABLE),
+        "vary": Listed("variables", 1, 64, "what may vary: over a range, among listed values, or among components",
+                       item=Variants((_VARIABLE, COMPONENT_AXIS))),
         "best": Listed("goals", 0, 8, "results that are to be as small, or with max as large, as possible", item=_GOAL),
         "subject_to": Listed("constraints", 0, 32, "what a feasible design must fulfil", item=_CONSTRAINT),
         "at": Listed(
@@ -161,6 +163,9 @@ def read_variables(goal: Node) -> Variables | None:
 
 
 def _variable(item: Node) -> dict[str, Any] | None:
+    if COMPONENT in item:
+        paths, plan = read_components(item)
+        return None if paths is None or plan is None else {"paths": list(paths), "values": plan.expand().tolist()}
     if not _VARIABLE.read(item):
         return None
     paths = read_path_of(item["path"])
@@ -196,6 +201,9 @@ def read_points(goal: Node, variables: Variables | None) -> list[dict[str, float
                 continue
             if path in machine.derive:
                 place.refuse("conflict", "is derived from other parameters", path, allowed="a path of `base`")
+            elif (kind := machine.component_of(path)) is not None:
+                message = Sentence("follows from the component `{kind}`, which varies", kind=kind)
+                place.refuse("conflict", message, path, allowed=N_("a path that no component gives"))
             elif path not in machine.parameters:
                 message = Sentence("names no parameter{hint}", hint=did_you_mean(path, machine.parameters))
                 place.refuse("invalid-path", message, path, allowed="a path of `base`")

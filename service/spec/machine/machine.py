@@ -14,6 +14,7 @@ from sprag_study.service.reading.texts import did_you_mean
 
 if TYPE_CHECKING:
     from sprag_study.worker.models import ClutchFit, Parameter
+    from sprag_study.worker.models.components import Components
 
 
 @dataclass
@@ -26,12 +27,18 @@ class Machine:
     parameters : flat path -> parameter, for every number that an axis can vary
     structure : its non-numeric part as stored in a study; None where the model has none or it could not be read
     derive : flat path -> formula in SI numbers, for every number that is derived from others
+    components : those among which the study chooses
     """
 
     values: dict[str, float] = field(default_factory=dict)
     parameters: dict[str, Parameter] = field(default_factory=dict)
     structure: dict[str, Any] | None = None
     derive: dict[str, str] = field(default_factory=dict)
+    components: tuple[Components, ...] = ()
+
+    def component_of(self, path: str) -> str | None:
+        """The kind of the component that gives a parameter its value; None where none does."""
+        return next((one.path for one in self.components if path in one.columns), None)
 
     @property
     def fits(self) -> dict[str, ClutchFit]:

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sprag_study.service.answers.differing import MOST_COMPARED, NO_PARAMETERS, common_axes, unique_names
+from sprag_study.service.answers.differing import COMPONENTS, MOST_COMPARED, NO_PARAMETERS, common_axes, unique_names
 from sprag_study.service.presets import preset_text
 from sprag_study.service.reading.wording import number
+from sprag_study.service.spec.components import KINDS
 from sprag_study.service.spec.text import load_spec
 from sprag_study.worker import models
 from tests.service.conftest import Service
@@ -315,6 +316,8 @@ def test_what_varies_in_all_studies() -> None:
     assert common_axes([[load, drives, (("b",), 2)], [(("c", "shaft.load"), 2), drives, (("b",), 1)]]) == [X]
     assert common_axes([[drives], [drives]]) == []
     assert NO_PARAMETERS == models.NO_PARAMETERS
+    assert common_axes([[load, (("clutch",), 3)], [load, (("clutch",), 3)]]) == [X]  # other clutches in each
+    assert set(KINDS) == COMPONENTS
 
 
 def test_names_of_studies_tell_them_apart() -> None:

@@ -199,6 +199,7 @@ FORM: Final = Form(
             change="Add or change a motor", keep="Keep the motor",
             choice="characteristic", ways=_COMPONENT_MOTORS,
             titles={kind: MOTORS[kind][0] for kind in _COMPONENT_MOTORS},
+            chosen="drive/motor/kind", replaces=("drive/motor",),
         ),
     ),
     new={"/base/mechanism": "slider_crank", "/base/operation": "steps", "/refine/results": "irregularity"},

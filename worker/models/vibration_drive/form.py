@@ -95,6 +95,7 @@ FORM: Final = Form(
             sets={
                 "clutch/kind": "law", "clutch/windup_limit": "", **{f"pendulums/N/{name}": "" for name in _RATINGS},
             },
+            replaces=("clutch",),
         ),
     ),
     called="a vibration drive",

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from sprag_study.worker.models.common import NO_PARAMETERS, ChunkResult, ChunkTask, chunk_result
+from sprag_study.worker.models.common import ChunkResult, ChunkTask, chunk_result
 from sprag_study.worker.models.vibration_drive.loads import with_settled_loads
 from sprag_study.worker.models.vibration_drive.settled import ARBITRARY_START, JUMPED, RESTARTED, settings_of
 from sprag_study.worker.sweeps import line_to
@@ -48,5 +48,5 @@ def start_of(study: Study, case: int) -> NDArray[np.float64] | None:
         return None
     line = line_to(study, case)
     columns: dict[str, Any] = {**study.base, **study.columns(line)}
-    machine = {path: column for path, column in columns.items() if path not in NO_PARAMETERS}
+    machine = {path: column for path, column in columns.items() if path not in study.beside}
     return sweep(machine, settings_of(study.run), np.arange(line.size)[None, :]).starts[-1:]

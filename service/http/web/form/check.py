@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlencode
 
@@ -21,6 +22,7 @@ from sprag_study.service.http.web.form.sent import with_first_values
 from sprag_study.service.http.web.form.spec import form_with_spec
 from sprag_study.service.http.web.form.walk import Filled
 from sprag_study.service.jobs.preview import preview_json
+from sprag_study.service.jobs.start_from import with_components
 from sprag_study.service.jobs.submission import Order, Submission, submission
 from sprag_study.service.languages import _, gettext, grouped, ngettext
 from sprag_study.service.reading.faults import message
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
     from sprag_study.worker.study import Study
 
     Known = Callable[[Study], int]
+    Complete = Callable[[Any], Any]
 
 
 @dataclass(slots=True)
@@ -105,12 +108,21 @@ def _none_known(_study: Study) -> int:
     return 0
 
 
+def _as_it_is(spec: Any) -> Any:
+    return spec
+
+
 def look_over(
-    values: Mapping[str, str], chunking: Chunking, known: Known, now: datetime, choice: Choice | None = None
+    values: Mapping[str, str],
+    chunking: Chunking,
+    known: Known,
+    now: datetime,
+    choice: Choice | None = None,
+    complete: Complete = _as_it_is,
 ) -> Checked:
     """Check a form, given by fields or as text, with its deadline; ``known`` as for `check_form`.
 
-    ``choice`` has the units and names of the sentence about it.
+    ``choice`` has the units and names of the sentence about it; ``complete`` gives components their fields.
     """
     text, finish, fault = values.get("finish_by", "").strip(), None, ""
     try:
@@ -119,9 +131,9 @@ def look_over(
         fault = message(Fault("/finish_by", error.code, error.message, allowed=ALLOWED))
     left = None if finish is None else (finish - now).total_seconds()
     if "/text" in values:
-        checked = check_text(values["/text"], values.get("format", "json"), chunking, known, left)
+        checked = check_text(values["/text"], values.get("format", "json"), chunking, known, left, complete)
     else:
-        checked = check_form(values, chunking, known, left)
+        checked = check_form(values, chunking, known, left, complete)
     checked.finish, checked.finish_text = finish, text
     if fault:
         checked.faults["finish_by"], checked.parsed, checked.preview = [fault], None, None
@@ -140,7 +152,8 @@ def look_over(
 def checked_form(library: Library, values: Mapping[str, str], now: datetime, choice: Choice) -> Checked:
     """Check a form in a process; ``choice`` as of `look_over`."""
     store = library.store
-    checked = look_over(values, store.dispatchers.chunking, store.reuse.count, now, choice)
+    complete = partial(with_components, store)
+    checked = look_over(values, store.dispatchers.chunking, store.reuse.count, now, choice, complete)
     # The study itself is not returned: it can be large, and no page shows it.
     return replace(checked, parsed=None, form=None)
 
@@ -148,7 +161,8 @@ def checked_form(library: Library, values: Mapping[str, str], now: datetime, cho
 def submitted_form(library: Library, values: Mapping[str, str], now: datetime) -> tuple[Checked, Submission | None]:
     """Check a form in a process; also its study, None where the form has faults."""
     store = library.store
-    checked = look_over(values, store.dispatchers.chunking, store.reuse.count, now)
+    complete = partial(with_components, store)
+    checked = look_over(values, store.dispatchers.chunking, store.reuse.count, now, complete=complete)
     parsed, finish = checked.parsed, checked.finish
     made = None if parsed is None else submission(parsed, store, Order(now, finish_by=finish))
     return replace(checked, parsed=None, form=None), made
@@ -171,7 +185,11 @@ def _time(preview: Preview) -> str:
 
 
 def check_form(
-    values: Mapping[str, str], chunking: Chunking, known: Known = _none_known, left: float | None = None
+    values: Mapping[str, str],
+    chunking: Chunking,
+    known: Known = _none_known,
+    left: float | None = None,
+    complete: Complete = _as_it_is,
 ) -> Checked:
     """Check a filled form.
 
@@ -184,7 +202,7 @@ def check_form(
         spec, faults=faults, form=form, empty=frozenset(name for name, text in values.items() if not text.strip())
     )
     try:
-        found.parsed = parse_spec(spec)
+        found.parsed = parse_spec(complete(spec))
     except SpecError as error:
         for item in error.faults:
             name = _beside(form.field_of(item.where or ""), values.get("edited", ""))
@@ -224,13 +242,18 @@ def _assumed(text: str) -> list[str]:
 
 
 def check_text(
-    text: str, form: str, chunking: Chunking, known: Known = _none_known, left: float | None = None
+    text: str,
+    form: str,
+    chunking: Chunking,
+    known: Known = _none_known,
+    left: float | None = None,
+    complete: Complete = _as_it_is,
 ) -> Checked:
     """Check a spec given as text, JSON or TOML; ``known`` and ``left`` as for `check_form`."""
     found = Checked({})
     try:
         loaded = load_spec(text, "toml" if form == "toml" else "json")
-        found.parsed = parse_spec(loaded)
+        found.parsed = parse_spec(complete(loaded))
     except SpecError as error:
         found.faults["/text"] = [f"{item.where or _('the spec')}: {message(item)}" for item in error.faults]
         return found

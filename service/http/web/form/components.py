@@ -45,7 +45,10 @@ def take_component(values: Values, records: Iterable[ComponentRecord]) -> None:
     rowed = values.get(f"{BASE}/{choice}") == "own"
     if not rowed and any(name.startswith(f"{shared}/") for name in kind.fields.values()):
         indices = range(count)
-    for name, text in (*kind.sets.items(), *((kind.fields[name], text) for name, text in chosen.fields.items())):
+    for name, text in (
+        *kind.sets.items(),
+        *((kind.fields[name], text) for name, text in chosen.fields.items() if name in kind.fields),
+    ):
         at, inside, own = name.partition("/N/")
         if not inside and rows and rowed and name.startswith(f"{shared}/"):
             at, inside, own = rows.at, "/N/", name

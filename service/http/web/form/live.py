@@ -63,7 +63,7 @@ def drawn_machine(values: Mapping[str, str]) -> tuple[Study, dict[str, Any]] | N
     """
     spec, _faults = spec_of(with_first_values(values))
     try:
-        parsed = parse_spec({**without_cases(spec), "axes": []})
+        parsed = parse_spec({**without_cases(spec), "axes": [], "quantities": {}})
     except SpecError:
         try:
             parsed = parse_spec(single_machine(spec))  # what only an axis gives has a value of it

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
 from sprag_study.service.http.problems import ApiError
+from sprag_study.service.spec.component_axes import with_base
 from sprag_study.service.spec.derive import with_values
 from sprag_study.service.spec.document import parse_spec
 from sprag_study.service.spec.fields import base_path
@@ -35,12 +36,14 @@ def single_machine(spec: Mapping[str, Any]) -> dict[str, Any]:
     value in the middle of the axis.
     """
     spec = accepted(spec)
-    axes = parse_spec(spec).study.axes
+    whole = parse_spec(spec).study
+    if whole.components:  # what is asked of prices is not asked of one machine
+        spec = {**with_base(spec), "quantities": {}}
     base = Node(Report(), "/base", spec["base"])
-    middle = {path: axis.values[len(axis.values) // 2] for axis in axes for path in axis.paths}
+    middle = {path: axis.values[len(axis.values) // 2] for axis in whole.axes for path in axis.paths}
     given = {
         path: value for path, value in middle.items()
-        if path not in models.NO_PARAMETERS and not base.below(path).given
+        if path not in whole.beside and not base.below(path).given
     }  # fmt: skip
     kept = without_cases(spec)
     parsed = parse_spec({**kept, "base": with_values(spec["base"], given)})
