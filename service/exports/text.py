@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag_study.sentences import name_of
 from sprag_study.service.exports.source import machine
 from sprag_study.service.json_text import to_bytes
 from sprag_study.service.reading.catalogue import unit_of
@@ -127,7 +128,13 @@ def read_table(columns: Mapping[str, Sequence[Any]], si: Mapping[str, str], unit
     """
     shown = {name: si.get(name, "1") for name in columns}
     header = [_headed(name, units.unit(unit), unit) for name, unit in shown.items()]
-    return table_csv(header, [[units.cell(value, unit) for value in columns[name]] for name, unit in shown.items()])
+    return table_csv(header, [[_shown(value, unit, units) for value in columns[name]] for name, unit in shown.items()])
+
+
+def _shown(value: Any, unit: str, units: Units) -> Any:
+    """A cell in a reader's units; a number that stands for a component as its name."""
+    name = name_of(value, unit) if isinstance(value, float) else None
+    return units.cell(value, unit) if name is None else name
 
 
 def _headed(name: str, unit: str, known: str) -> str:

@@ -90,10 +90,10 @@ class _MapPainting(Painting):
         # Lines of equal value end at the outer values; cells are around them.
         across, up = (drawn.x_values, drawn.y_values) if self._levels else self._edges
         self._high = min(_HIGH, _SHARE * width)
-        self._y = Scale(float(up[0]), float(up[-1]), self._high, 0.0)
-        self._left = max(text_width(tick_text(value), SMALL) for value in self._y.rising()) + 16.0
+        self._y = Scale(float(up[0]), float(up[-1]), self._high, 0.0, unit=drawn.units[1])
+        self._left = max(text_width(self._y.text(value), SMALL) for value in self._y.rising()) + 16.0
         self._plot = width - self._left - _RIGHT
-        self._x = Scale(float(across[0]), float(across[-1]), 0.0, self._plot)
+        self._x = Scale(float(across[0]), float(across[-1]), 0.0, self._plot, unit=drawn.units[0])
 
     def element(self, label: str, head: Sequence[str], *, below: bool) -> str:
         """The whole picture."""
@@ -135,7 +135,7 @@ class _MapPainting(Painting):
         heights = self._y(np.array(ticks)).tolist()
         yield element("path", d="".join(f"M-5 {short(at)}h5" for at in heights), stroke="var(--edge)")
         yield element("rect", width=self._plot, height=self._high, fill="none", stroke="var(--edge)")
-        yield y_numbers(ticks, heights, -9.0)
+        yield y_numbers(self._y, ticks, heights, -9.0)
 
     def _colours(self, known: Floats) -> tuple[Ints, list[str]]:
         """Which colour each cell has, -1 for none, and the colours."""

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag_study.sentences import Named, Sentence, name_of
+from sprag_study.sentences import Sentence
 from sprag_study.service.faults import refused
 from sprag_study.service.reading.catalogue import result_of, unit_of
 from sprag_study.service.reading.cyrillic import latin
@@ -132,9 +132,7 @@ class Units:
         return value if unit == si else value / _size(unit, si)
 
     def cell(self, value: Any, si: str) -> Any:
-        """A cell of a table: a number in its unit, or the name for which it stands; other values as they are."""
-        if isinstance(si, Named) and isinstance(value, float):
-            return name_of(value, si)
+        """A cell of a table: a number in its unit; texts and missing numbers as they are."""
         return self.value(value, si) if isinstance(value, float) else value
 
     def values(self, values: NDArray[np.float64], si: str) -> NDArray[np.float64]:

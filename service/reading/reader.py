@@ -275,6 +275,8 @@ class Reading:
         return number(shown, exact), unit_text(unit)
 
     def _readable(self, value: Any, si: str, digits: int) -> tuple[Any, str]:
+        if isinstance(value, float) and (name := name_of(value, si)) is not None:
+            return name, "1"
         shown, unit = self.value(value, si), self.unit(si)
         if si == _RADIANS and unit != si and _short(value, digits) and not _short(shown, digits):
             return value, si

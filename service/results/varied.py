@@ -80,11 +80,13 @@ def is_even(values: Sequence[float]) -> bool:
 def values_text(study: Study, axis: Axis, reading: Reading) -> str:
     """How many values an axis has; those of a short one that are not evenly divided."""
     values = shown_values(study, axis).tolist()
+    unit = unit_of(study, axis.paths[0])
+    if isinstance(unit, Named) and len(values) <= _LISTED:
+        return "; ".join(unit.names[int(value)] for value in values)
     if study.plan is not None or not NO_PARAMETERS.isdisjoint(axis.paths) or is_even(values):
         return number(len(values))
     if len(values) > _LISTED:
         return _("{count}, unequal", count=number(len(values)))
-    unit = unit_of(study, axis.paths[0])
     return "; ".join(number(reading.value(value, unit), _DIGITS) for value in values)
 
 

@@ -26,6 +26,7 @@ from sprag_study.service.spec.components import (
 )
 from sprag_study.service.spec.derive import read_machine
 from sprag_study.service.spec.described import Record
+from sprag_study.service.spec.kinds.draft import Draft
 from sprag_study.service.spec.node import Node
 from sprag_study.service.spec.report import Report, SpecError
 from sprag_study.worker.limits import MAX_AXIS_VALUES, MAX_NAME_LENGTH, MAX_NOTES_LENGTH
@@ -274,13 +275,18 @@ def _put(base: Any, at: Sequence[str | int], value: object) -> None:
 def _machine_of(node: Node, component: Component, part: SpecPart, spec: Any) -> Machine | None:
     """The machine with a component; None, and faults recorded at the component, where it is invalid."""
     report = Report(spec)
-    machine = read_machine(Node(report, "", spec), part)
-    if not report.faults:
-        part.check(report, machine, (), "grid")
-    for fault in report.faults:
+    report.machine = machine = read_machine(Node(report, "", spec), part)
+    faults = list(report.faults)
+    if not faults:
+        part.check(Draft(Node(report, "", spec), str(spec["model"]), "", axes=(), combine="grid"))
+        # What is wrong elsewhere without the axes need not be wrong with them.
+        given = [f"/base/{'/'.join(map(str, at))}" for place in _given_places(component)
+                 for at in _places(spec["base"], place)]  # fmt: skip
+        faults = [fault for fault in report.faults if (fault.where or "").startswith(tuple(given))]
+    for fault in faults:
         message = Sentence("{name}: {message}", name=component.name, message=fault.message)
         node.refuse(fault.code, message, fault.value, allowed=fault.allowed, unit=fault.unit)
-    return None if report.faults else machine
+    return None if faults else machine
 
 
 def _components(

@@ -125,14 +125,14 @@ def _grid(placed: Placed) -> Iterator[str]:
     yield element("path", d="".join(f"M0 {short(at)}h{short(placed.width)}" for at in heights), stroke="var(--grid)")
     zero = 0.0 if 0.0 in ticks else placed.y.low
     yield element("path", d=f"M0 {short(placed.y.at(zero))}h{short(placed.width)}", stroke="var(--edge)")
-    yield y_numbers(ticks, heights, -7.0)
+    yield y_numbers(placed.y, ticks, heights, -7.0)
 
 
-def y_numbers(ticks: Sequence[float], heights: Sequence[float], right: float) -> str:
+def y_numbers(y: Scale, ticks: Sequence[float], heights: Sequence[float], right: float) -> str:
     """The numbers at the left of an axis that goes up, which end at ``right``."""
     return element(
         "g",
-        "".join(text_at(tick_text(value), right, at + 4.0) for value, at in zip(ticks, heights, strict=True)),
+        "".join(text_at(y.text(value), right, at + 4.0) for value, at in zip(ticks, heights, strict=True)),
         class_="y", text_anchor="end", font_size=SMALL, fill="var(--soft)",
     )  # fmt: skip
 
@@ -144,7 +144,7 @@ def x_numbers(x: Scale, top: float) -> Iterator[str]:
     yield element("path", d="".join(f"M{short(at)} {short(top)}v4" for at in places), stroke="var(--edge)")
     yield element(
         "g",
-        "".join(text_at(tick_text(value), at, top + 17.0) for value, at in zip(ticks, places, strict=True)),
+        "".join(text_at(x.text(value), at, top + 17.0) for value, at in zip(ticks, places, strict=True)),
         class_="x", text_anchor="middle", font_size=SMALL, fill="var(--soft)",
     )  # fmt: skip
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from sprag_study.sentences import Named, name_of
 from sprag_study.service.figures.painter.elements import SMALL, text_width
 from sprag_study.service.reading.wording import number
 
@@ -29,7 +30,10 @@ _DEGREES: Final = (1.0, 5.0, 15.0, 30.0, 45.0, 60.0, 90.0, 180.0, 360.0, 720.0)
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """An axis from ``low`` to ``high`` over the pixels from ``start`` to ``end``; ``log`` for equal factors."""
+    """An axis from ``low`` to ``high`` over the pixels from ``start`` to ``end``; ``log`` for equal factors.
+
+    Numbers of a unit that stand for names are whole, and written as these names.
+    """
 
     low: float
     high: float
@@ -57,6 +61,10 @@ class Scale:
         """The pixel of one value."""
         return float(self(value))
 
+    def text(self, value: float) -> str:
+        """A number of the axis, or the name for which it stands."""
+        return name_of(value, self.unit) or tick_text(value)
+
     def ticks(self) -> list[float]:
         """Round numbers along the axis, as many as have room."""
         pixels = abs(self.end - self.start)
@@ -74,6 +82,9 @@ class Scale:
     def round_numbers(self, wanted: int) -> list[float]:
         """About ``wanted`` round numbers between the ends."""
         low, high = min(self.low, self.high), max(self.low, self.high)
+        if isinstance(self.unit, Named):
+            every = range(math.ceil(low), min(math.floor(high), len(self.unit.names) - 1) + 1)
+            return [float(place) for place in every[:: max(len(every) // max(wanted, 1), 1)]]
         if not high > low:
             return [low]
         if self.log and len(found := _decades(low, high, wanted)) > 1:
@@ -84,7 +95,7 @@ class Scale:
 
     def _fits(self, ticks: list[float], pixels: float) -> bool:
         edges: list[tuple[float, float]] = []
-        for at, text in zip(self(np.array(ticks)).tolist(), map(tick_text, ticks), strict=True):
+        for at, text in zip(self(np.array(ticks)).tolist(), map(self.text, ticks), strict=True):
             half = text_width(text, SMALL) / 2.0
             edges.append((at - half, at + half))
         edges.sort()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sprag_study.sentences import Amount, Name
+from sprag_study.sentences import Amount, Name, name_of
 from sprag_study.service.reading.catalogue import unit_of
 from sprag_study.service.reading.reader import Phrase, joined, plural, term
 from sprag_study.service.results.fronts import history, worst_of, worst_places
@@ -145,7 +145,7 @@ def _dimensions(found: Designs, best: int) -> Iterator[KeyNumber]:
     for path, value in values.items():
         unit, before = unit_of(study, path), study.base.get(path)
         note = NOTHING if before is None else Phrase("{value} before", value=Amount(before, unit, DIMENSION_DIGITS))
-        yield KeyNumber(path, value, unit, DIMENSION_DIGITS, note=note, case=case)
+        yield KeyNumber(path, name_of(value, unit) or value, unit, DIMENSION_DIGITS, note=note, case=case)
 
 
 def _limit(found: Designs, best: int, limit: Limit) -> KeyNumber:

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from sprag_study.service.http.web.form.entries import Values
+from sprag_study.service.http.web.form.fields import Choice, Groups
 from sprag_study.service.http.web.form.machine import BASE, form_of, rows_of
+from sprag_study.service.languages import gettext
 from sprag_study.service.reading.numbers import whole_number
 from sprag_study.service.storage.components import ComponentRecord
 from sprag_study.worker.models.form import Rows
@@ -20,6 +22,21 @@ def component_groups(
         for kind in form_of(values).components
     )
     return [(title, group) for title, group in groups if group]
+
+
+def component_choices(values: Mapping[str, str], records: Sequence[ComponentRecord]) -> Groups:
+    """The kinds of components that can vary in a machine of the form, those of which there are some."""
+    kinds = [kind for kind in form_of(values).components if any(one.component.kind == kind.name for one in records)]
+    found = [Choice(kind.name, gettext(kind.title), "1") for kind in kinds]
+    return [(gettext("Components"), found)] if found else []
+
+
+def component_names(records: Sequence[ComponentRecord]) -> dict[str, str]:
+    """The names of the components of each kind, as a field of a form has them."""
+    names: dict[str, list[str]] = {}
+    for one in records:
+        names.setdefault(one.component.kind, []).append(one.component.name)
+    return {kind: "; ".join(own) for kind, own in names.items()}
 
 
 def rows_with_components(values: Mapping[str, str]) -> Rows | None:

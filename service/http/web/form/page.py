@@ -27,7 +27,13 @@ from sprag_study.service.http.views import preset_of
 from sprag_study.service.http.web.form.beginning import beginning, examples_of
 from sprag_study.service.http.web.form.check import Checked, checked_form, submitted_form
 from sprag_study.service.http.web.form.columns import take_columns
-from sprag_study.service.http.web.form.components import component_groups, rows_with_components, take_component
+from sprag_study.service.http.web.form.components import (
+    component_choices,
+    component_groups,
+    component_names,
+    rows_with_components,
+    take_component,
+)
 from sprag_study.service.http.web.form.entries import Values, plain, text_of
 from sprag_study.service.http.web.form.fields import (
     FORM_MODEL,
@@ -325,7 +331,8 @@ def sheet_form(request: Request, values: Values, checked: Checked | None, opened
     reading = _reading(values)
     values = values if text_mode else with_own_units(values, reading)
     parts = parts_of(values)
-    choices = [] if text_mode else _choices(values)
+    records = () if text_mode else request.app.state.context.store.components.all()
+    choices = [] if text_mode else [*_choices(values), *component_choices(values, records)]
     sheet = None if text_mode else _sheet(request, values, checked, choices, opened)
     rows = {} if text_mode else {name: range(count_of(values, name)) for name in parts}
 
@@ -352,7 +359,8 @@ def sheet_form(request: Request, values: Values, checked: Checked | None, opened
         "refined": is_refined(values),
         "kept": _kept(values),
         "choices": choices,
-        "components": [] if text_mode else component_groups(values, request.app.state.context.store.components.all()),
+        "components": [] if text_mode else component_groups(values, records),
+        "component_names": component_names(records),
         "component_rows": rows_with_components(values),
         "undoable": bool(history_of(values)),
         "presets": [preset_of(name) for name in (preset_names() if text_mode else examples_of(model))],

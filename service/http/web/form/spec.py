@@ -4,8 +4,11 @@ are made. Only the spec's reader interprets the fields.
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any, Final
 
 from sprag_study.service.http.web.form.entries import (
@@ -27,6 +30,8 @@ from sprag_study.service.reading.ranges import Spacing, TypedRange, typed_range
 from sprag_study.service.reading.together import with_last_unit
 from sprag_study.service.spec.axes.axes import SWEPT
 from sprag_study.service.spec.axes.sample import SAMPLE, SCALE
+from sprag_study.service.spec.component_axes import COMPONENT
+from sprag_study.service.spec.components import KINDS
 from sprag_study.service.spec.described import ANY_RUN, SETTLED_RUN, SHAFT_RUN
 from sprag_study.service.spec.kinds.goal import GOAL
 from sprag_study.service.spec.kinds.refine import REFINE
@@ -349,6 +354,50 @@ class _Axes:
         return PARTS["axes"].show({"axes": axes}, form)
 
 
+@dataclass(frozen=True, slots=True)
+class _Varied:
+    """A row of what varies: a parameter with values, as ``plain`` reads it, or a kind of components with their names.
+
+    The field ``of`` has the components whose fields a spec has, so that they are those of the spec again.
+    """
+
+    plain: Record
+
+    def filled(self, form: Filled) -> bool:
+        """As of an `Item`."""
+        return self.plain.filled(form)
+
+    def value(self, form: Filled) -> dict[str, Any]:
+        """As of an `Item`."""
+        kind = form.text("path")
+        if kind not in KINDS:
+            return self.plain.value(form)
+        form.fields |= {form.pointer: f"{form.at}/values", f"{form.pointer}/{COMPONENT}": f"{form.at}/path"}
+        known = {own["name"]: own for own in _components_in(form.text("of"))}
+        names = filter(None, (name.strip() for name in form.text("values").split(";")))
+        return {COMPONENT: kind, "of": [known.get(name, name) for name in names]}
+
+    def fill(self, item: Mapping[str, Any], form: Filled) -> None:
+        """As of an `Item`."""
+        if COMPONENT not in item:
+            self.plain.fill(item, form)
+            return
+        names = [own if isinstance(own, str) else str(own["name"]) for own in item["of"]]
+        if set(item) - {COMPONENT, "of"} or any(";" in name for name in names):
+            raise ValueError("the form has no fields for these components")
+        whole = [own for own in item["of"] if not isinstance(own, str)]
+        form.show({"path": str(item[COMPONENT]), "values": "; ".join(names), "of": json.dumps(whole) if whole else ""})
+
+
+def _components_in(text: str) -> list[dict[str, Any]]:
+    """The components of a hidden field; none where it is not as the page made it."""
+    with suppress(ValueError):
+        listed = json.loads(text)
+        if isinstance(listed, list):
+            return [own for own in listed if isinstance(own, dict) and isinstance(own.get("name"), str)]
+    return []
+
+
 _PATHS: Final = Cell(("path",), ("path", "tied"), _paths, _path_fields)
 _RANGE: Final = Cell(
     ("from", "to"), ("from", "to"), Filled.ranged,
@@ -395,10 +444,12 @@ PARTS: Final = {
     rows.name: rows
     for rows in (
         Rows(
-            "axes", "/axes", MAX_AXES, Record((_PATHS, _AXIS_VALUES, chosen(SWEPT.name)), whole="/path"),
+            "axes", "/axes", MAX_AXES,
+            _Varied(Record((_PATHS, _AXIS_VALUES, chosen(SWEPT.name)), whole="/path")),
         ),
         Rows(
-            "vary", "/goal/vary", GOAL.listed["vary"].high, Record((_PATHS, _VARIABLE_VALUES), whole="/values"),
+            "vary", "/goal/vary", GOAL.listed["vary"].high,
+            _Varied(Record((_PATHS, _VARIABLE_VALUES), whole="/values")),
         ),
         Rows(
             "best", "/goal/best", GOAL.listed["best"].high, Record((_RESULT, _TOWARD, *_COUNTED), whole="/result"),
