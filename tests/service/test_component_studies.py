@@ -124,7 +124,8 @@ def test_curves_tables_and_files_have_the_names(office: Service) -> None:
         assert page.status_code == 200, address
         assert "F-120" in page.text, address
     across = office.http.get(
-        f"{API}/studies/{study_id}/curves", params={"x": "spring", "y": "efficiency", "format": "svg"}
+        f"{API}/studies/{study_id}/curves",
+        params={"x": "spring", "y": "efficiency", "by": "shaft.load", "format": "svg"},
     )
     assert "F-100" in across.text
     field = office.http.get(
