@@ -19,8 +19,8 @@ NUMBERED: Final = {
 #: Parts of a spec beside those of a machine.
 PARTS: Final = (
     N_("Columns"), N_("Count"), N_("Csv"), N_("Data"), N_("Diagram"), N_("Drives"), N_("Goal"), N_("Limits"),
-    N_("Points"), N_("Rows"), N_("Run"), N_("Sense"), N_("Starts"), N_("Table"), N_("Tolerances"), N_("Torque"),
-    N_("Values"),
+    N_("Points"), N_("Price"), N_("Rows"), N_("Run"), N_("Sense"), N_("Starts"), N_("Table"), N_("Tolerances"),
+    N_("Torque"), N_("Values"),
 )  # fmt: skip
 #: Labels of settings of the run that have a field in the form.
 RUN_LABELS: Final = {

@@ -31,7 +31,9 @@ MEANING: Final[dict[str, tuple[Fraction | int | str, str]]] = {
     "hp": (550 * _FOOT * _LBF, "kg*m^2/s^3"), "PS": (75 * _KGF, "kg*m^2/s^3"), "Ws": (1, "kg*m^2/s^2"),
     "Wh": (3600, "kg*m^2/s^2"), "g0": (_KGF, "m/s^2"), "Nm": (1, "kg*m^2/s^2"), "Ncm": ("0.01", "kg*m^2/s^2"),
     "Nmm": ("0.001", "kg*m^2/s^2"), "Nms": (1, "kg*m^2/s"), "Ncms": ("0.01", "kg*m^2/s"),
-    "Nmms": ("0.001", "kg*m^2/s"), "%": ("0.01", "1"),
+    "Nmms": ("0.001", "kg*m^2/s"), "%": ("0.01", "1"), "EUR": (1, "euro"), "UAH": (1, "hryvnia"),
+    "USD": (1, "us_dollar"), "GBP": (1, "pound_sterling"), "CHF": (1, "swiss_franc"),
+    "PLN": (1, "zloty"), "CZK": (1, "czech_koruna"),
 }  # fmt: skip
 PREFIX: Final = {"n": "1e-9", "u": "1e-6", "µ": "1e-6", "m": "1e-3", "c": "1e-2", "d": "0.1", "k": "1e3", "M": "1e6",
                  "G": "1e9"}  # fmt: skip
@@ -60,11 +62,11 @@ def _symbols() -> set[str]:
 
 def _si(factor: Fraction | int | str, unit: str) -> tuple[Fraction, dict[str, int]]:
     powers: dict[str, int] = {}
-    for sign, name, power in re.findall(r"(^|[*/])([a-z0-9]+)(?:\^(\d))?", unit):
+    for sign, name, power in re.findall(r"(^|[*/])([a-z0-9_]+)(?:\^(\d))?", unit):
         if name != "1":
             powers[name] = (-1 if sign == "/" else 1) * int(power or 1)
     names = {"kg": "gram", "m": "meter", "s": "second", "rad": "radian"}
-    return Fraction(factor), {names[name]: power for name, power in powers.items()}
+    return Fraction(factor), {names.get(name, name): power for name, power in powers.items()}
 
 
 def test_every_symbol_has_its_meaning_here() -> None:
