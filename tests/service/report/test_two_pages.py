@@ -10,7 +10,6 @@ import pytest
 
 from sprag_study.sentences import Amount, Sentence
 from sprag_study.service import languages
-from sprag_study.service.presets import preset_names
 from sprag_study.service.reading.numbers import in_language
 from sprag_study.service.reading.reader import Choice
 from sprag_study.service.reading.units import parse_quantity
@@ -35,10 +34,13 @@ if TYPE_CHECKING:
 
 #: Kinds of studies that choose their own cases are run by formulas; all others are presets with made-up rows.
 CHOOSING: Final = ("search", "calibration", "refined")
-KINDS: Final = (
-    *CHOOSING,
-    *(name for name in preset_names() if not {"refine", "goal", "calibrate"} & set(preset(name))),
-)
+#: What makes documents differ: one axis and several, drawn drives, several motions; machines of a linkage, of several
+#: parts, of a cam, and steps of an operation.
+PRESETS: Final = (
+    "one_pendulum", "two_pendulums", "tolerances", "two_motions", "six_bar_press", "four_cylinder_engine",
+    "cam_machine", "question_operation",
+)  # fmt: skip
+KINDS: Final = (*CHOOSING, *PRESETS)
 #: What stands in specs and in faults, and in no document.
 CODES: Final = re.compile(r"[a-z]+_[a-z]|\b[a-z]+\.[0-9]|[a-z]\.[a-z]{3}|(?<![A-Za-zµ·])/[a-z]{3}")
 
