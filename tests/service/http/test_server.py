@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
+import socket
 import threading
 from typing import TYPE_CHECKING, Any, cast
 
@@ -145,8 +146,6 @@ def test_a_child_that_does_not_end_is_killed() -> None:
 
 
 def test_an_address_in_use_is_told(settings: Settings) -> None:
-    import socket
-
     with socket.create_server(("127.0.0.1", 0)) as taken:
         busy = settings.model_copy(update={"port": taken.getsockname()[1]})
         with pytest.raises(AddressError, match=r"cannot listen on 127\.0\.0\.1 port"):
@@ -234,7 +233,8 @@ def test_a_signal_during_the_start_begins_the_shutdown() -> None:
     before = signal.signal(signal.SIGTERM, lambda number, _frame: seen.append(number))
     shutdown = Ending(ending, lambda: None, lambda: None, last_seconds=600.0)
     try:
-        Server(uvicorn.Config(starting, port=0, lifespan="on", log_config=None), shutdown).run()
+        with socket.create_server(("127.0.0.1", 0)) as listener:  # the oldest uvicorn leaves its own one open here
+            Server(uvicorn.Config(starting, lifespan="on", log_config=None), shutdown).run(sockets=[listener])
     finally:
         shutdown.ended()
         signal.signal(signal.SIGTERM, before)
