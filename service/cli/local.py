@@ -84,6 +84,8 @@ def check(
 
     With --server that service checks it, with its database and its processes.
     """
+    from sprag_study.service.reading.directions import ends_in_words
+
     finish, settings = _finish(finish_by), None
     if names_service():
         refuse_here(db=db)
@@ -111,10 +113,7 @@ def check(
         write_text(_("{count} of the cases need not be run: the database has them", count=made["reusable"]) + "\n")
     with table_words():
         heads = ((_("axis"), False), (_("unit"), False), (_("values"), True), (_("least"), True), (_("largest"), True))
-        rows = [
-            (", ".join(axis["paths"]), axis["unit"], axis["values"], axis["least"], axis["largest"])
-            for axis in made["axes"]
-        ]
+        rows = [(", ".join(axis["paths"]), axis["unit"], axis["values"], *ends_in_words(axis)) for axis in made["axes"]]
         if rows:
             show_table(_("Axes"), heads, rows)
         if made["derive"]:

@@ -40,7 +40,9 @@ def is_named(study: Study, path: str) -> bool:
 
 
 def ends_in_words(axis: AxisInfo) -> tuple[Value, Value]:
-    """The least and the largest value of an axis, whatever their order."""
+    """The least and the largest value of an axis, whatever their order; of components the first and the last one."""
+    if names := axis.get("names"):
+        return names[0], names[-1]
     ends = (axis["least"], axis["largest"])
     least, largest = (_in_words(axis["paths"][0], end, axis["unit"]) for end in ends)
     return least, largest

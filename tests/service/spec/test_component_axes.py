@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from sprag_study.service.presets import preset_text
+from sprag_study.service.reading.catalogue import axes_json
+from sprag_study.service.reading.directions import ends_in_words
 from sprag_study.service.spec.component_axes import with_fields
 from sprag_study.service.spec.components import Component
 from sprag_study.service.spec.design import design_spec, points_spec
@@ -61,6 +63,8 @@ def test_each_place_has_all_parameters_of_its_component() -> None:
     assert (case["clutch.price"], case["spring.price"]) == (58.0, 8.0)
     assert [(one.name, one.unit) for one in study.quantities] == [("cost", "EUR")]
     assert Study.from_text(study.to_text()) == study
+    sent = json.loads(json.dumps(axes_json(study)))  # as a service sends them
+    assert [ends_in_words(axis) for axis in sent] == [("FW 16", "FW 25"), ("F-100", "F-120"), (0.1, 0.2)]
 
 
 def test_the_cases_are_those_of_the_same_numbers_on_plain_axes() -> None:
