@@ -73,8 +73,11 @@ def test_an_option_of_a_group_is_read_once_for_all_its_commands() -> None:
     "words", [("--units", "rpm", "ID", "curves"), ("ID", "curves", "--units", "rpm"), ("--units=rpm", "curves", "ID")]
 )
 def test_an_option_of_a_group_stands_before_or_behind_its_command(words: tuple[str, ...]) -> None:
-    show = cast("Any", command_line().commands["show"])
-    context = show.make_context("show", list(words), parent=None, resilient_parsing=True)
+    root = command_line()
+    show = cast("Any", root.commands["show"])
+    # A command keeps the help option that it has first, whose names are those of its parent.
+    parent = typer.Context(root, **root.context_settings)
+    context = show.make_context("show", list(words), parent=parent, resilient_parsing=True)
     name, command, rest = show.resolve_command(context, [*context._protected_args, *context.args])
     inner = command.make_context(name, rest, parent=context)
     assert (name, inner.params["study"], inner.params["units"]) == ("curves", "ID", "rpm")
