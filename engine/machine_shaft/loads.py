@@ -66,20 +66,20 @@ def loads(moving: Moving, endings: NDArray[np.int8]) -> Floats:
     machine, d = moving.machine, moving.decomposition
     spec, cases = machine.spec, machine.columns.cases
     infos = load_infos(len(machine.parts), len(joints_of(spec)))
-    found = _of_shaft(machine, d)
+    values = _of_shaft(machine, d)
     with np.errstate(all="ignore"):
         shaped = _Shaped(d)
         joints = 0
         for number, part in enumerate(machine.parts):
-            found |= {f"parts.{number}.{name}": own for name, own in _of_part(part, moving, shaped).items()}
+            values |= {f"parts.{number}.{name}": value for name, value in _of_part(part, moving, shaped).items()}
             for x, y in _joint_forces(part, moving):
                 force = _of_force(shaped(x), shaped(y), d)
-                found |= {f"joints.{joints}.force.{name}": own for name, own in force.items()}
+                values |= {f"joints.{joints}.force.{name}": value for name, value in force.items()}
                 joints += 1
     rows = np.full((cases, len(infos)), np.nan)
     for column, info in enumerate(infos):
-        if info.name in found:
-            rows[:, column] = found[info.name]
+        if info.name in values:
+            rows[:, column] = values[info.name]
     rows[endings != _OK] = np.nan
     rows[~np.isfinite(rows)] = np.nan
     return rows
@@ -99,9 +99,9 @@ def _of_shaft(machine: Machine, d: Decomposition) -> dict[str, Floats]:
     drive = machine.train.inertia
     mechanism = np.ascontiguousarray(d.fields.inertia - drive)
     most = d.panels.extremes(mechanism).highest
-    own = np.broadcast_to(drive[:, 0, 0], most.shape)
+    of_drive = np.broadcast_to(drive[:, 0, 0], most.shape)
     with np.errstate(all="ignore"):
-        return {"energy.start": d.start, "inertia.mechanism.max": most, "inertia.ratio": most / own}
+        return {"energy.start": d.start, "inertia.mechanism.max": most, "inertia.ratio": most / of_drive}
 
 
 def _of_part(part: ShaftPart, moving: Moving, shaped: Callable[[Floats], Floats]) -> dict[str, Floats]:
@@ -111,15 +111,15 @@ def _of_part(part: ShaftPart, moving: Moving, shaped: Callable[[Floats], Floats]
         return {}
     slope = shaped(motion.way_slope)
     acceleration = d.panels.slope(slope) * d.squares + slope * d.acceleration()
-    found = {
+    values = {
         "stroke": np.broadcast_to(stroke.length[:, 0, 0], (len(slope),)),
         "speed.max": _largest(slope * np.sqrt(d.squares), d),
         "acceleration.max": _largest(acceleration, d),
     }
     if part.choice.operation.quantity not in {"none", "torque"}:
         push = part.push(d.panels.angles, slope, moving.omega, moving.factor[:, None, None])
-        found["force.max"] = _largest(shaped(push), d)
-    return found
+        values["force.max"] = _largest(shaped(push), d)
+    return values
 
 
 def _largest(values: Floats, d: Decomposition) -> Floats:

@@ -111,10 +111,10 @@ def read_with_components(spec: Node, part: SpecPart) -> Machine:
     machine = read_machine(Node(spec.report, "", whole), part)
     if spec.report.found > before:
         places = {
-            f"/base/{'/'.join(map(str, at))}": (item["of"][one.index(first)], first)
+            pointer: (item["of"][one.index(first)], first)
             for item, one, first in zip(items, lists, firsts, strict=True)
-            for place in _given_places(first) for at in _places(whole["base"], place)
-        }  # fmt: skip
+            for pointer in _pointers(whole["base"], first)
+        }
         spec.report.faults[listed:] = [_at_component(fault, places) for fault in spec.report.faults[listed:]]
         raise spec.report.error()
     for item, one in zip(items, lists, strict=True):
@@ -237,10 +237,19 @@ def _given_places(component: Component) -> list[str]:
 def _at_component(fault: Fault, places: Mapping[str, tuple[Node, Component]]) -> Fault:
     """A fault of the base at the component that gives it; ``places`` are pointers that components give."""
     for pointer, (node, component) in places.items():
-        if (fault.where or "").startswith(pointer):
+        if _lies_in(fault, pointer):
             message = Sentence("{name}: {message}", name=component.name, message=fault.message)
             return replace(fault, where=node.pointer, message=message)
     return fault
+
+
+def _pointers(base: Mapping[str, Any], component: Component) -> list[str]:
+    """Pointers to what a component gives in a base."""
+    return [f"/base/{'/'.join(map(str, at))}" for place in _given_places(component) for at in _places(base, place)]
+
+
+def _lies_in(fault: Fault, pointer: str) -> bool:
+    return f"{fault.where}/".startswith(f"{pointer}/")
 
 
 def _places(base: Mapping[str, Any], place: str) -> list[list[str | int]]:
@@ -280,9 +289,8 @@ def _machine_of(node: Node, component: Component, part: SpecPart, spec: Any) -> 
     if not faults:
         part.check(Draft(Node(report, "", spec), str(spec["model"]), "", axes=(), combine="grid"))
         # What is wrong elsewhere without the axes need not be wrong with them.
-        given = [f"/base/{'/'.join(map(str, at))}" for place in _given_places(component)
-                 for at in _places(spec["base"], place)]  # fmt: skip
-        faults = [fault for fault in report.faults if (fault.where or "").startswith(tuple(given))]
+        given = _pointers(spec["base"], component)
+        faults = [fault for fault in report.faults if any(_lies_in(fault, pointer) for pointer in given)]
     for fault in faults:
         message = Sentence("{name}: {message}", name=component.name, message=fault.message)
         node.refuse(fault.code, message, fault.value, allowed=fault.allowed, unit=fault.unit)
