@@ -6,6 +6,7 @@ import os
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import pytest
@@ -40,14 +41,23 @@ def test_clients_do_not_hear_of_locks(tmp_path: Path) -> None:
 
 def overwritten(database: Path) -> None:
     content = bytearray(database.read_bytes())
-    content[: len(content) // 2] = os.urandom(len(content) // 2)
+    content[: len(content) // 2] = Random(1).randbytes(len(content) // 2)
     database.write_bytes(content)
 
 
 def damaged_within(database: Path) -> None:
     content = bytearray(database.read_bytes())
-    content[len(content) // 3 : -16384] = os.urandom(len(content[len(content) // 3 : -16384]))
+    content[len(content) // 3 : -16384] = Random(2).randbytes(len(content[len(content) // 3 : -16384]))
     database.write_bytes(content)
+
+
+def damaged_name(database: Path) -> None:
+    """SQLite's message quotes the name of a table, which is no text any more."""
+    connection = sqlite_driver().connect(database)
+    connection.execute("PRAGMA writable_schema = ON")
+    connection.execute("UPDATE sqlite_master SET name = CAST(x'edff' AS TEXT), sql = 'CREATE' WHERE name = 'studies'")
+    connection.commit()
+    connection.close()
 
 
 def cut_short(database: Path) -> None:
@@ -76,6 +86,7 @@ def signals() -> Iterator[None]:
     [
         (overwritten, "is not a Sprag database", "name another file with --db"),
         (damaged_within, "is damaged", "`sprag admin db check`"),
+        (damaged_name, "is damaged", "`sprag admin db check`"),
         (cut_short, "is damaged", "`sprag admin db backup`"),
         (of_a_newer_version, "newer than this program", "run its `sprag admin db upgrade`"),
     ],

@@ -204,10 +204,8 @@ class Session:
             with self.transaction() as connection:
                 yield connection
             return
-        try:
+        with self._explaining():
             yield moment.connection(self)
-        except sa.exc.DBAPIError as error:
-            raise self._explained(error) from error
 
     def transaction(self) -> AbstractContextManager[sa.Connection]:
         """A read transaction of its own."""
@@ -261,13 +259,10 @@ class Session:
 
     @contextmanager
     def _transaction(self, engine: sa.Engine, kind: str, began: float) -> Iterator[sa.Connection]:
-        try:
-            with engine.begin() as connection:
-                if self.on_wait is not None:
-                    self.on_wait(kind, perf_counter() - began)
-                yield connection
-        except sa.exc.DBAPIError as error:
-            raise self._explained(error) from error
+        with self._explaining(), engine.begin() as connection:
+            if self.on_wait is not None:
+                self.on_wait(kind, perf_counter() - began)
+            yield connection
 
     def insert_blocks(self, connection: sa.Connection, place: Target, blocks: Iterable[Block]) -> None:
         """Insert rows of finished chunks, bypassing SQLAlchemy for speed."""
@@ -277,12 +272,12 @@ class Session:
     @contextmanager
     def plain(self) -> Iterator[sa.Connection]:
         """A connection in autocommit mode, for statements that do not work in a transaction."""
-        try:
-            options = {"isolation_level": "AUTOCOMMIT"} if self.on_server else {}
-            with self._engine.connect().execution_options(**{_BEGIN: ""}, **options) as connection:
-                yield connection
-        except sa.exc.DBAPIError as error:
-            raise self._explained(error) from error
+        options = {"isolation_level": "AUTOCOMMIT"} if self.on_server else {}
+        with (
+            self._explaining(),
+            self._engine.connect().execution_options(**{_BEGIN: ""}, **options) as connection,
+        ):
+            yield connection
 
     def checkpoint(self) -> None:
         """Move the write-ahead log into the file as far as no reader needs the old state; a server does so itself.
@@ -309,6 +304,18 @@ class Session:
         """Notifications of changes."""
         news: News = _postgres().News(self.url, BUSY_SECONDS) if self.on_server else FileNews(self.path)
         return news
+
+    @contextmanager
+    def _explaining(self) -> Iterator[None]:
+        """Errors of the driver are raised as DatabaseError where their cause is external."""
+        try:
+            yield
+        except sa.exc.DBAPIError as error:
+            raise self._explained(error) from error
+        except UnicodeDecodeError as error:  # the driver's, for a message of SQLite that quotes damaged bytes
+            if self._file is None:
+                raise
+            raise self._file.explained(error) from error
 
     def _explained(self, error: sa.exc.DBAPIError) -> Exception:
         if self._file is not None:

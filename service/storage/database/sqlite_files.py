@@ -256,14 +256,14 @@ class DatabaseFile:
             raise (found if isinstance(found, StoreError) else DatabaseError(str(error))) from error
         return True
 
-    def explained(self, error: sa.exc.DBAPIError) -> Exception:
+    def explained(self, error: sa.exc.DBAPIError | UnicodeDecodeError) -> Exception:
         """A DatabaseError with one sentence where the cause is external, otherwise the error itself."""
         # SQLite reports all kinds of errors when the file and its log no longer belong together.
         try:
             self.require_same()
         except DatabaseError as moved:
             return moved
-        text = str(error.orig)
+        text = error.object.decode(errors="replace") if isinstance(error, UnicodeDecodeError) else str(error.orig)
         known = {
             "database is locked": in_use(str(self.path)) if self._alone else busy(str(self.path)),
             "database or disk is full": DatabaseFullError(f"the disk that holds {self.path} is full"),
