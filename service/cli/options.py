@@ -89,7 +89,10 @@ CurveBy = Annotated[
 Database = Annotated[
     str | None,
     typer.Option(
-        "--db", metavar="URL", help="Database: path of an SQLite file or SQLAlchemy URL; default: as `sprag serve`."
+        "--db",
+        metavar="URL",
+        help="Database: path of an SQLite file or SQLAlchemy URL; default: SPRAG_DATABASE, or `sprag.sqlite3` in the "
+        "user's data directory.",
     ),
 ]
 KeptIn = Annotated[
