@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 from html import escape
+from itertools import combinations
 from typing import TYPE_CHECKING, Final, Literal
 
 from sprag_study.service.figures.painter.elements import text_width
@@ -118,6 +119,42 @@ def balanced(dimensions: Sequence[Dimension]) -> tuple[tuple[Dimension, ...], tu
     return left, right
 
 
+def uncrossed(rows: Sequence[Dimension], x: float, places: Sequence[float]) -> tuple[Dimension, ...]:
+    """Dimensions of one side in an order in which no line to its place, at ``x``, crosses another one."""
+    order = list(rows)
+
+    def line(row: int) -> tuple[complex, complex]:
+        return complex(x, places[row]), complex(order[row].x, order[row].y)
+
+    # Two lines that cross are together longer than after an exchange of their places, so that this ends.
+    while pair := next((each for each in combinations(range(len(order)), 2) if _cross(*map(line, each))), None):
+        upper, lower = pair
+        order[upper], order[lower] = order[lower], order[upper]
+    return tuple(order)
+
+
+def _cross(first: tuple[complex, complex], second: tuple[complex, complex]) -> bool:
+    """Whether the ends of each of two lines lie at different sides of the other one."""
+
+    def apart(line: tuple[complex, complex], points: tuple[complex, complex]) -> bool:
+        along = (line[1] - line[0]).conjugate()
+        before, behind = ((along * (point - line[0])).imag for point in points)
+        return before * behind < 0.0
+
+    return apart(first, second) and apart(second, first)
+
+
+def field_places(
+    drawing: Drawing, rows: Sequence[Sequence[Dimension]], step: float, at: float
+) -> tuple[tuple[float, ...], ...]:
+    """Where the lines end at the fields of each column (px), with the drawing in the middle of their height.
+
+    ``step`` is the distance of two fields, ``at`` that of a line's end from the top of its field.
+    """
+    above = max(max(map(len, rows)) * step - drawing.height, 0.0) / 2
+    return tuple(tuple(row * step + at - above for row in range(len(side))) for side in rows)
+
+
 def with_leaders(
     drawing: Drawing, step: float, gap: float, at: float, rows: Sequence[Sequence[Dimension]] | None = None,
     links: Mapping[str, str] | None = None,
@@ -126,17 +163,16 @@ def with_leaders(
 
     Parameters
     ----------
-    step, gap, at : distances of two fields, of the columns from the drawing, and of a line's end from the top of its
-        field (px); the drawing is in the middle of the height of the columns
+    step, at : as of `field_places`
+    gap : distance of the columns from the drawing (px)
     rows : dimensions of the fields of both columns, from top to bottom; by default all, at their sides
     links : as of `svg`
     """
     sides = rows or (rows_of(drawing, "left"), rows_of(drawing, "right"))
-    above = max(max(map(len, sides)) * step - drawing.height, 0.0) / 2
+    columns = zip(sides, (-gap, drawing.width + gap), field_places(drawing, sides, step, at), strict=True)
     lines = "".join(
-        _leader(each, edge, row * step + at - above)
-        for side, edge in zip(sides, (-gap, drawing.width + gap), strict=True) for row, each in enumerate(side)
-    )  # fmt: skip
+        _leader(each, edge, y) for side, edge, places in columns for each, y in zip(side, places, strict=True)
+    )
     text = svg(drawing, links=links)
     place = text.index(">") + 1
     return text[:place] + lines + text[place:]
@@ -184,14 +220,16 @@ def _beside(drawing: Drawing, labels: Mapping[str, str], links: Mapping[str, str
     for side in ("left", "right"):
         rows = [each for each in rows_of(drawing, side) if labels.get(each.path)]
         edge, end = (-8.0, ' text-anchor="end"') if side == "left" else (drawing.width + 8.0, "")
-        for each, y in zip(rows, _spread([each.y for each in rows], drawing.height), strict=True):
+        begins = edge + (4.0 if side == "left" else -4.0)
+        places = _spread([each.y for each in rows], drawing.height)
+        for each, y in zip(uncrossed(rows, begins, places), places, strict=True):
             symbol_ = f'<tspan class="letter">{_printed(each.symbol, " = ")}</tspan>' if each.symbol else ""
             text = (
                 f'<text data-mark="{escape(each.path)}" x="{edge:g}" y="{y + 4:g}"{end}>'
                 f"{symbol_}{escape(labels[each.path])}</text>"
             )
             found.append(
-                _leader(each, edge + (4 if side == "left" else -4), y)
+                _leader(each, begins, y)
                 + (f'<a href="{escape(links[each.path])}">{text}</a>' if each.path in links else text)
             )
     return "".join(found)

@@ -7,7 +7,7 @@ import math
 import re
 from dataclasses import replace
 from functools import cache
-from itertools import pairwise
+from itertools import combinations, pairwise
 from xml.etree import ElementTree
 
 import pytest
@@ -130,3 +130,19 @@ def test_labels_beside_a_drawing_do_not_touch(name: str) -> None:
             rows = sorted(float(y) for x, y in labels if x == side)
             # 10 px of capital letters, 5 px of an index below the line, and room between both.
             assert all(below - above >= 20.0 for above, below in pairwise(rows))
+
+
+def test_lines_to_labels_of_one_side_do_not_cross() -> None:
+    for drawing in _every_drawing():
+        text = svg(drawing, {each.path: "1 mm" for each in drawing.dimensions}, alone=True)
+        lines = [tuple(map(float, line)) for line in re.findall(r'"leader"[^>]* d="M(\S+) (\S+)L(\S+) (\S+)"', text)]
+        assert len(lines) == len(drawing.dimensions)
+        for (x, y, to_x, to_y), (x_, y_, to_x_, to_y_) in combinations(lines, 2):
+            if x != x_ or to_x in {x, to_x_}:
+                continue
+            # Heights of both lines where the shorter one ends.
+            end = min(to_x, to_x_, key=lambda each: abs(each - x))
+            first, second = (
+                at + (to - at) * (end - x) / (far - x) for at, to, far in ((y, to_y, to_x), (y_, to_y_, to_x_))
+            )
+            assert (first - second) * (y - y_) > -1e-9, drawing.title

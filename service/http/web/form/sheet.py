@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING, Final
 
 from markupsafe import Markup
 
-from sprag_study.service.figures.drawing import Dimension, Drawing, Side, balanced, rows_of, svg, with_leaders
+from sprag_study.service.figures.drawing import (
+    Dimension,
+    Drawing,
+    Side,
+    balanced,
+    field_places,
+    rows_of,
+    svg,
+    uncrossed,
+    with_leaders,
+)
 from sprag_study.service.figures.drawings import BETWEEN_FIELDS
 from sprag_study.service.figures.painter.elements import text_width
 from sprag_study.service.http.web.form.entries import Values, names_of, plain
@@ -264,19 +274,25 @@ def _plan(
     )  # fmt: skip
     name = f"{_SIDES}{drawing.at}"
     before = [names_of(text) for text in values.get(name, "").split(";")]
-    if sorted(path for side in before for path in side) == sorted(own):
+    stay = sorted(path for side in before for path in side) == sorted(own)
+    if stay:
         rows = tuple(tuple(own[path] for path in side) for side in before)
     sided: dict[str, Side] = dict.fromkeys((each.path for each in rows[0]), "left")
     sided |= dict.fromkeys((each.path for each in rows[1]), "right")
     drawing = replace(drawing, dimensions=tuple(
         replace(each, side=sided.get(each.path, each.side)) for each in drawing.dimensions
     ))  # fmt: skip
-    left, right = (tuple(by_path[each.path] for each in side) for side in rows)
-    tall = any(text_width(f"{spot.label} {spot.entry.field.symbol}", _SIZE) > (_ROOM_VARY if spot.may_vary else _ROOM)
-               for spot in (*left, *right))  # fmt: skip
+    tall = any(
+        text_width(f"{spot.label} {spot.entry.field.symbol}", _SIZE) > (_ROOM_VARY if spot.may_vary else _ROOM)
+        for spot in (by_path[path] for path in own)
+    )
     more = _LINE if tall else 0.0
     step = (_STEP_MECHANISM if drawing.at else _STEP) + (_TOLERANT if tolerant else 0.0) + more
     gap = _GAP + (max(BETWEEN_FIELDS - drawing.width, 0.0) / 2 if drawing.at else 0.0)
+    if not stay:
+        places = field_places(drawing, rows, step, _AT + more)
+        rows = tuple(map(uncrossed, rows, (-gap, drawing.width + gap), places))
+    left, right = (tuple(by_path[each.path] for each in side) for side in rows)
     picture = Markup(with_leaders(drawing, step, gap, _AT + more, rows, links))  # noqa: S704 - as above
     return Plan(drawing, picture, left, right, tall, (name, ";".join(map(_paths, rows))))
 
