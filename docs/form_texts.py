@@ -11,7 +11,7 @@ from sprag_study.service.spec.kinds.goal import GOAL
 from sprag_study.service.spec.kinds.refine import REFINE
 from sprag_study.service.spec.kinds.tolerances import DRAWS
 from sprag_study.service.spec.machine.shaft import MEAN_SPEED_IS
-from sprag_study.service.spec.machine.shaft_drive import BALANCE, BALANCE_SIDE, FLYWHEEL, MOTOR, STAGE
+from sprag_study.service.spec.machine.shaft_drive import BALANCE, BALANCE_SIDE, FLYWHEEL, FLYWHEEL_SHAFT, MOTOR, STAGE
 from sprag_study.service.spec.machine.shaft_parts import (
     EFFICIENCY_IS,
     INDICATOR_OVER,
@@ -36,6 +36,7 @@ def form_values() -> Iterator[str]:
         BALANCE,
         BALANCE_SIDE,
         FLYWHEEL,
+        FLYWHEEL_SHAFT,
         MOTOR,
         STAGE,
         INDICATOR_OVER,

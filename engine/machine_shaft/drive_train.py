@@ -35,19 +35,24 @@ class Train:
         Speed of the motor's shaft over that of the main shaft; power at the main shaft over that at the motor.
     direct : bool
         Whether there are no stages: the motor's shaft is the main shaft.
+    flywheel : Flywheel or None
+        The one that is given by its dimensions; its inertia is part of I'.
     """
 
     inertia: Floats
     ratio: Floats
     efficiency: Floats
     direct: bool
+    flywheel: Flywheel | None = None
 
     @classmethod
     def of(cls, drive: Drive, values: Mapping[str, Floats]) -> "Train":
         """The train of ``drive`` with the ``values`` by path."""
         inertia, ratio, efficiency = values["drive.inertia"], np.ones((1, 1, 1)), np.ones((1, 1, 1))
+        flywheel = None
         if drive.flywheel:
-            inertia = inertia + Flywheel.of(drive.flywheel, values).inertia
+            flywheel = Flywheel.of(drive.flywheel, values, _ratio_from(drive, values, drive.flywheel_shaft))
+            inertia = inertia + flywheel.reduced_inertia
         for index in reversed(range(len(drive.stages))):
             kind, prefix = drive.stages[index], f"drive.stages.{index}."
             own = {path.removeprefix(prefix): value for path, value in values.items() if path.startswith(prefix)}
@@ -58,7 +63,7 @@ class Train:
             inertia = inertia + (own["inertia"] + own.get("mass", 0.0) * np.square(way)) * np.square(ratio)
         if "drive.motor.inertia" in values:
             inertia = inertia + values["drive.motor.inertia"] * np.square(ratio)
-        return cls(inertia, ratio, efficiency, not drive.stages)
+        return cls(inertia, ratio, efficiency, not drive.stages, flywheel)
 
     def motor(self, values: Mapping[str, Floats]) -> dict[str, Floats]:
         """Numbers of a motor as it acts on the main shaft, with the efficiency of the train."""
@@ -98,3 +103,11 @@ class Train:
         if self.direct:
             return torque
         return np.asarray(torque * np.where(torque >= 0.0, 1.0 / self.efficiency, self.efficiency) / self.ratio)
+
+
+def _ratio_from(drive: Drive, values: Mapping[str, Floats], shaft: int | None) -> Floats:
+    """Speed of the input shaft of a stage over that of the main shaft, (cases or 1, 1, 1); None is the main shaft."""
+    ratio = np.ones((1, 1, 1))
+    for index in range(len(drive.stages) if shaft is None else shaft, len(drive.stages)):
+        ratio = ratio * values.get(f"drive.stages.{index}.ratio", 1.0)
+    return ratio

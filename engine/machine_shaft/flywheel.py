@@ -10,7 +10,7 @@ from sprag_study.engine.machine_shaft.columns import Columns
 from sprag_study.engine.machine_shaft.results import result_infos
 from sprag_study.engine.machine_shaft.roots import bracketed_roots
 from sprag_study.engine.machine_shaft.spec import Flywheel as Shapes
-from sprag_study.engine.machine_shaft.spec import MachineSpec, MeanSpeed
+from sprag_study.engine.machine_shaft.spec import MeanSpeed
 from sprag_study.engine.machine_shaft.start import Shape, Stop, least_mean_speed, mean_speed
 
 Floats = NDArray[np.float64]
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Flywheel:
-    """A flywheel on the main shaft; all arrays have the shape (cases or 1, 1, 1).
+    """A flywheel on a shaft of the train; all arrays have the shape (cases or 1, 1, 1).
 
     A thin rim of the mean diameter D has J = m D^2/4 and the hoop stress rho v^2 with v = omega D/2. A solid disc has
     J = m D^2/8 and, at its centre, the stress (3 + nu)/8 rho v^2 with v at its edge (S. P. Timoshenko, J. N. Goodier,
@@ -30,24 +30,32 @@ class Flywheel:
         J/(m D^2).
     factor : array
         Stress/(rho v^2).
+    ratio : array
+        Speed of its shaft over that of the main shaft.
     """
 
     values: Mapping[str, Floats]
     form: float
     factor: Floats
+    ratio: Floats
 
     @classmethod
-    def of(cls, shape: Shapes, values: Mapping[str, Floats]) -> "Flywheel":
-        """The flywheel of the ``values`` by path."""
+    def of(cls, shape: Shapes, values: Mapping[str, Floats], ratio: Floats) -> "Flywheel":
+        """The flywheel of the ``values`` by path, on a shaft of the ``ratio``."""
         prefix = "drive.flywheel."
         own = {path.removeprefix(prefix): value for path, value in values.items() if path.startswith(prefix)}
         factor = 1.0 if shape == "rim" else (3.0 + own["poisson_ratio"]) / 8.0
-        return cls(own, 0.25 if shape == "rim" else 0.125, np.asarray(factor))
+        return cls(own, 0.25 if shape == "rim" else 0.125, np.asarray(factor), ratio)
 
     @property
     def inertia(self) -> Floats:
-        """In kg*m^2."""
+        """About its shaft, in kg*m^2."""
         return np.asarray(self.form * self.values["mass"] * np.square(self.values["diameter"]))
+
+    @property
+    def reduced_inertia(self) -> Floats:
+        """Reduced to the main shaft, in kg*m^2."""
+        return np.asarray(self.inertia * np.square(self.ratio))
 
     def results(self, fastest: Floats, drive: Floats, required: Floats) -> dict[str, Floats]:
         """Results by name, each (cases,).
@@ -55,17 +63,18 @@ class Flywheel:
         Parameters
         ----------
         fastest : array, shape (cases,)
-            Largest speed of the shaft in rad/s.
+            Largest speed of the main shaft in rad/s.
         drive, required : arrays, shape (cases,)
-            I' with the flywheel, and the required I', in kg*m^2.
+            I' with the flywheel, and the required I', both at the main shaft, in kg*m^2.
         """
         cases = len(fastest)
         own = {name: np.broadcast_to(value[:, 0, 0], (cases,)) for name, value in self.values.items()}
         inertia = np.broadcast_to(self.inertia[:, 0, 0], (cases,))
         factor = np.broadcast_to(self.factor.ravel(), (cases,))
-        speed = 0.5 * own["diameter"] * fastest
+        ratio = np.broadcast_to(self.ratio[:, 0, 0], (cases,))
+        speed = 0.5 * own["diameter"] * (fastest * ratio)
         stress = factor * own["density"] * np.square(speed)
-        needed = np.maximum(required - (drive - inertia), 0.0)
+        needed = np.maximum(required - (drive - inertia * np.square(ratio)), 0.0) / np.square(ratio)
         margin = np.sqrt(own["allowed_stress"] / stress)
         return {
             "flywheel.inertia": inertia, "flywheel.speed": speed, "flywheel.stress": stress,
@@ -138,13 +147,14 @@ def _runs(
 
 
 def flywheel_results(
-    spec: MachineSpec, columns: Columns, known: Mapping[str, Floats], *, fixed: bool
+    flywheel: Flywheel | None, columns: Columns, known: Mapping[str, Floats], *, fixed: bool
 ) -> dict[str, Floats]:
     """The required inertia by the energy alone, and the results of a flywheel given by its dimensions.
 
     Parameters
     ----------
-    spec : MachineSpec
+    flywheel : Flywheel or None
+        The one that is given by its dimensions.
     columns : Columns
         The numbers of the cases.
     known : mapping
@@ -166,7 +176,6 @@ def flywheel_results(
         out["required_inertia.energy"] = np.where(
             finite, known["energy.fluctuation"] / np.where(finite, wanted, 1.0), np.nan
         )
-    if spec.drive.flywheel:
-        flywheel = Flywheel.of(spec.drive.flywheel, columns.values)
+    if flywheel is not None:
         out |= flywheel.results(known["omega.max"], known["inertia.drive"], known["required_inertia"])
     return out

@@ -71,6 +71,16 @@ def check_structure(spec: MachineSpec) -> None:
         if spec.drive.table is None:
             raise StructureError(Sentence("A motor of the kind table needs a table of its torque over its speed."))
         characteristic(spec.drive)
+    shaft, stages = spec.drive.flywheel_shaft, len(spec.drive.stages)
+    if shaft is not None and not 0 <= shaft <= stages:
+        raise StructureError(
+            Sentence(
+                "The flywheel cannot sit on the shaft {given}: shafts are numbered from 0, the motor's, to {last}, the "
+                "main shaft.",
+                given=str(shaft),
+                last=str(stages),
+            )
+        )
     if len(spec.constants) > MAX_CONSTANTS:
         raise StructureError(Sentence("A machine has at most {most} constants.", most=MAX_CONSTANTS))
     taken = sorted((RESERVED | {"phi", "x"}) & set(spec.constants))

@@ -242,7 +242,7 @@ def _stage(index: int, kind: Stage) -> tuple[Parameter, ...]:
 
 
 _CRANK_ANGLE = Parameter(
-    "crank_angle", "alpha", "rad", -100.0, 100.0, False, 0.0, "angle of the part's crank at the shaft's angle 0"
+    "crank_angle", "alpha", "rad", -400.0, 400.0, False, 0.0, "angle of the part's crank at the shaft's angle 0"
 )
 
 

@@ -38,8 +38,9 @@ MAX_ATTEMPTS = 48
 #: Attempts after which panels are halved although the motion has a kink in them, and after which a kink alone makes no
 #: further attempt: near a speed that is only touched, kinks may come and go.
 _KINKS_FIRST, _MOST_CUTS = 3, 10
-#: Cases computed together: few enough for their arrays to stay in the processor's cache.
-BLOCK = 64
+#: Cases computed together, few enough for their arrays to stay in the processor's cache, and the revolutions of a cycle
+#: up to which they are as many.
+BLOCK, _BLOCK_CYCLE = 64, 12
 
 _NAMES = tuple(info.name for info in result_infos())
 _OF_TIME = np.array([_NAMES.index("omega.mean_time"), _NAMES.index("irregularity.time")])
@@ -208,7 +209,7 @@ def _attempt(machine: Machine, cuts: Floats) -> Solved:
     results |= machine.train.results(panels, d.drive.torque, results)
     fixed = spec.balance != "motor" and moved.omega is None
     results["required_inertia"] = _required(spec, columns, d, endings, fixed=fixed)
-    results |= flywheel_results(spec, columns, results, fixed=fixed)
+    results |= flywheel_results(machine.train.flywheel, columns, results, fixed=fixed)
     no_cycle = (endings == _CODE[Ending.MOTOR_STALLED]) | (endings == _CODE[Ending.MOTOR_OVERRUN])
     if no_cycle.any():
         for name, values in results.items():
@@ -387,8 +388,9 @@ def simulate(model: MachineSpec, columns: Mapping[str, ArrayLike], *, cases: int
     endings = np.empty(cases, dtype=np.int8)
     count = len(load_infos(len(model.every_part()), len(joints_of(model)))) if with_loads else 0
     further = np.full((cases, count), np.nan)
-    for first in range(0, cases, BLOCK):
-        part = slice(first, min(first + BLOCK, cases))
+    size = BLOCK * _BLOCK_CYCLE // max(model.cycle, _BLOCK_CYCLE)
+    for first in range(0, cases, size):
+        part = slice(first, min(first + size, cases))
         # Unbounded formulas and torques overflow to infinity, which the endings and empty results report.
         with np.errstate(all="ignore"):
             own = further[part] if with_loads else None

@@ -38,7 +38,7 @@ MAX_STEPS = 32
 HARMONICS = 6
 MAX_CONSTANTS = 32
 MAX_PARTS = 16
-REVOLUTIONS = tuple(range(1, 13))
+REVOLUTIONS = tuple(range(1, 61))
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,8 @@ class Drive:
 
     ``table`` is also that of a motor of the kind "table": its torque (N*m) over its speed (rad/s).
     ``stages`` are the kinds of the stages between motor and main shaft, motor first; the torque is then the motor's.
-    ``flywheel`` is the shape of one on the main shaft that is given by its dimensions.
+    ``flywheel`` is the shape of one that is given by its dimensions; it sits on the main shaft, or on the input shaft
+    of the stage with the number ``flywheel_shaft``.
     """
 
     form: Literal["constant", "table", "formula"] = "constant"
@@ -56,6 +57,7 @@ class Drive:
     motor: Motor | None = None
     stages: tuple[Stage, ...] = ()
     flywheel: Flywheel | None = None
+    flywheel_shaft: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +134,7 @@ class MachineSpec:
     Attributes
     ----------
     cycle : int
-        Revolutions of a cycle, 1 to 12.
+        Revolutions of a cycle, 1 to 60.
     mean_speed_is : {"midrange", "angle", "time"}
         Which mean of the speed the required mean speed and the irregularity refer to.
     balance : {"scale", "constant", "refuse", "motor"}

@@ -32,6 +32,8 @@ _INCLINATION: Final = "inclination"
 _BESIDE: Final = 14.0
 #: Of the train: distance of two shafts, height of its axis, and the largest radius of a wheel (px).
 _APART, _LEVEL, _LARGE = 84.0, 58.0, 30.0
+#: Length of a shaft between stages for a flywheel (px).
+_WHEEL_APART: Final = 56.0
 #: From the top of a part of the train to the middle of its letter (px).
 _ABOVE: Final = (0.0, -9.0)
 _STAGES: Final = {
@@ -189,7 +191,7 @@ def _at(path: str, x: float, y: float, width: float) -> Dimension:
 
 
 def _train(structure: Mapping[str, Any], base: Mapping[str, float]) -> Iterator[Drawing]:
-    """The motor, the stages and the flywheel on the main shaft, from left to right; none of a shaft alone.
+    """The motor, the stages and the flywheel on its shaft, from left to right; none of a shaft alone.
 
     Radii of the wheels of a stage are in its ratio, as far as there is room.
     """
@@ -204,7 +206,12 @@ def _train(structure: Mapping[str, Any], base: Mapping[str, float]) -> Iterator[
         shapes.append(_box(x - 30.0, gettext("Motor")))
         names = [path for path in base if path.startswith("drive.motor.")]
         dimensions += [Dimension(path, "", x - 30.0, _LEVEL - 18.0, "right", _ABOVE) for path in names[:1]]
+    on = drive.get("flywheel_shaft", len(stages)) if drive.get("flywheel") else None
     for index, kind in enumerate(stages):
+        if on == index:
+            shapes += [_line(x, x + _WHEEL_APART), *_flywheel(x + _WHEEL_APART / 2)]
+            dimensions += _flywheel_numbers(x + _WHEEL_APART / 2, base)
+            x += _WHEEL_APART
         wheels = _wheels(kind, x + _APART / 2, base.get(f"drive.stages.{index}.ratio", 1.0))
         shapes += [_line(x, x + _APART), *_stage(kind, x + _APART / 2, wheels)]
         name = next((own for own in ("ratio", "lead", "radius") if f"drive.stages.{index}.{own}" in base), "inertia")
@@ -213,15 +220,24 @@ def _train(structure: Mapping[str, Any], base: Mapping[str, float]) -> Iterator[
         x += _APART
     end = x + _APART
     shapes.append(_line(x, end))
-    if drive.get("flywheel"):
-        shapes.append(f'<rect class="mass" x="{x + 36:g}" y="{_LEVEL - 36:g}" width="12" height="72"/>')
-        dimensions.append(Dimension("drive.flywheel.mass", "", x + 48, _LEVEL - 28, "right"))
-        dimensions.append(Dimension("drive.flywheel.diameter", "", x + 48, _LEVEL + 28, "right"))
+    if on == len(stages):
+        shapes += _flywheel(x + _APART / 2)
+        dimensions += _flywheel_numbers(x + _APART / 2, base)
     shapes.append(f'<circle class="solid" cx="{end:g}" cy="{_LEVEL:g}" r="4"/>')
     about = gettext("Drawing of the train: from the motor to the shaft of the machine")
     width = end + 24.0
     sided = tuple(replace(each, side="left" if each.x < width / 2 else "right") for each in dimensions)
     yield Drawing(gettext("Train"), about, width, 2 * _LEVEL, "".join(shapes), sided, at="drive")
+
+
+def _flywheel(x: float) -> Iterator[str]:
+    yield f'<rect class="mass" x="{x - 6:g}" y="{_LEVEL - 36:g}" width="12" height="72"/>'
+
+
+def _flywheel_numbers(x: float, base: Mapping[str, float]) -> Iterator[Dimension]:
+    for name, y in (("mass", -28.0), ("diameter", 28.0)):
+        if f"drive.flywheel.{name}" in base:
+            yield Dimension(f"drive.flywheel.{name}", "", x + 6, _LEVEL + y, "right")
 
 
 def _line(start: float, end: float) -> str:

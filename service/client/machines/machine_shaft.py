@@ -67,9 +67,11 @@ class ShaftDriveStage(TypedDict, total=False):
 
 
 class ShaftDriveFlywheel(TypedDict, total=False):
-    """A flywheel on the main shaft, given by its dimensions.
+    """A flywheel given by its dimensions, on a shaft of the train.
 
     kind : Shape of the flywheel: a thin rim or a solid disc.
+    shaft : Number of the shaft on which it sits: K is the input shaft of stage K, 0 the motor's; by default the main
+        shaft.
     diameter : Mean diameter of the rim, or outer diameter of the disc (D), m; > 0 m and <= 1000 m.
     mass : Mass of the rim or disc (m), kg; > 0 kg and <= 1e+09 kg.
     density : Density of its material (rho), kg/m^3; > 0 kg/m^3 and <= 100000 kg/m^3.
@@ -78,6 +80,7 @@ class ShaftDriveFlywheel(TypedDict, total=False):
     """
 
     kind: Literal["rim", "disc"]
+    shaft: int
     diameter: Quantity
     mass: Quantity
     density: Quantity
@@ -96,7 +99,7 @@ class ShaftDrive(TypedDict, total=False):
         synchronous_speed, breakdown_torque, breakdown_slip, scale, table, csv, interpolation; needed: kind.
     stages : Stages between motor and main shaft, motor first; fields kind, ratio, efficiency, output_inertia, inertia,
         mass, radius, lead; needed: kind.
-    flywheel : A flywheel on the main shaft, given by its dimensions; fields kind, diameter, mass, density,
+    flywheel : A flywheel given by its dimensions, on a shaft of the train; fields kind, shaft, diameter, mass, density,
         poisson_ratio, allowed_stress; needed: kind, diameter, mass.
     """
 
@@ -503,7 +506,7 @@ class ShaftOperation(TypedDict, total=False):
 class ShaftPart(TypedDict, total=False):
     """A mechanism with its operation; their angle is that of the shaft plus the crank angle.
 
-    crank_angle : Angle of the part's crank at the shaft's angle 0 (alpha), rad; >= -100 rad and <= 100 rad.
+    crank_angle : Angle of the part's crank at the shaft's angle 0 (alpha), rad; >= -400 rad and <= 400 rad.
     mechanism : What the shaft drives: a table, a formula, or dimensions and masses; fields table, csv, formula,
         slider_crank, four_bar, drag_link, toggle, scotch_yoke, parallel_crank, quick_return, cam, linkage,
         interpolation.
@@ -828,7 +831,7 @@ class Shaft(Studies):
         drive : values
             What turns the shaft; fields inertia, torque, scale, motor, stages, flywheel.
         cycle : values, optional
-            Revolutions of a cycle, 1 to 12.
+            Revolutions of a cycle, 1 to 60.
         mean_speed : number or text with a unit, optional
             Required mean speed of the shaft (w_m), rad/s; > 0 rad/s and <= 1e+06 rad/s.
         mean_speed_is : values, optional

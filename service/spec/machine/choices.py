@@ -56,6 +56,8 @@ def _chosen(structure: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield "drive.motor.kind", drive["motor"]
     if drive.get("flywheel"):
         yield "drive.flywheel.kind", drive["flywheel"]
+    if "flywheel_shaft" in drive:
+        yield "drive.flywheel.shaft", str(drive["flywheel_shaft"])
     if drive.get("stages"):
         yield "drive.stages", ", ".join(drive["stages"])
     if drive["table"]:

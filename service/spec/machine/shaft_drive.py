@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from sprag_study.sentences import Sentence
-from sprag_study.service.spec.described import Listed, Record, Variants, choice
+from sprag_study.service.spec.described import Described, Listed, Record, Variants, choice
 from sprag_study.service.spec.machine.shaft_numbers import numbers_of, numbers_under, refuse_foreign
 from sprag_study.service.spec.machine.shaft_parts import (
     ANGLE,
@@ -32,6 +32,10 @@ MOTOR: Final = choice("kind", "kind of the motor", "linear", "kloss", "table")
 #: The rows of a motor's table.
 _SPEED: Final = Parameter("speed", "w", "rad/s", 0.0, 1e6, False, None, "speed of the motor")
 FLYWHEEL: Final = choice("kind", "shape of the flywheel: a thin rim or a solid disc", "rim", "disc")
+_ON_SHAFT: Final = (
+    "number of the shaft on which it sits: K is the input shaft of stage K, 0 the motor's; by default the main shaft"
+)
+FLYWHEEL_SHAFT: Final = Described("shaft", "", _ON_SHAFT, "whole", 0, machine_shaft.MAX_STAGES)
 STAGE: Final = choice("kind", "kind of the stage", *machine_shaft.STAGE_KINDS)
 _STAGE: Final = Record({"kind": STAGE, **numbers_under("drive.stages.K.")}, required=("kind",))
 STAGES: Final = Listed(
@@ -45,8 +49,8 @@ _MOTOR: Final = Record(
 )
 _WHEEL: Final = numbers_under("drive.flywheel.")
 _FLYWHEEL: Final = Record(
-    {"kind": FLYWHEEL, **_WHEEL},
-    "a flywheel on the main shaft, given by its dimensions",
+    {"kind": FLYWHEEL, FLYWHEEL_SHAFT.name: FLYWHEEL_SHAFT, **_WHEEL},
+    "a flywheel given by its dimensions, on a shaft of the train",
     required=("kind", *required_of(_WHEEL)),
 )
 _DIAGRAM: Final = Record(
@@ -121,8 +125,7 @@ def read_drive(node: Node, places: dict[str, str]) -> dict[str, Any] | None:
     if "stages" in node:
         drive["stages"] = _read_stages(node["stages"])
     if "flywheel" in node and drive.get("stages", ()) is not None:
-        wheel = node["flywheel"]
-        drive["flywheel"] = FLYWHEEL.read(wheel) if _FLYWHEEL.read(wheel) else None
+        drive |= _read_flywheel(node["flywheel"], len(drive.get("stages", ())))
     if drive.get("stages", ()) is None or drive.get("flywheel", "") is None:
         return None
     torque = node["torque"]
@@ -139,6 +142,21 @@ def read_drive(node: Node, places: dict[str, str]) -> dict[str, Any] | None:
         return None
     places["drive"] = torque["csv" if "csv" in torque else diagram["form"]].pointer
     return drive | diagram
+
+
+def _read_flywheel(node: Node, stages: int) -> dict[str, Any]:
+    """Read the shape of a flywheel, and its shaft where that is not the main shaft; None as shape with a fault."""
+    shape = FLYWHEEL.read(node) if _FLYWHEEL.read(node) else None
+    own = node[FLYWHEEL_SHAFT.name]
+    shaft = FLYWHEEL_SHAFT.read(node) if shape is not None and own.value is not None else None
+    if not own.sound:
+        return {"flywheel": None}
+    if shaft is not None and shaft > stages:
+        text = Sentence("is no shaft of this train: {last} is its main shaft", last=str(stages))
+        own.refuse("out-of-range", text, allowed=Sentence(">= {low} and <= {high}", low=0, high=stages))
+        return {"flywheel": None}
+    # What is on the main shaft has no number, so that studies from before there was one keep their hash.
+    return {"flywheel": shape} | ({} if shaft in {None, stages} else {"flywheel_shaft": shaft})
 
 
 def _read_stages(node: Node) -> list[str] | None:

@@ -66,7 +66,7 @@ EFFICIENCY_IS: Final = choice(
 )  # fmt: skip
 _NAME = re.compile(r"[A-Za-z_][A-Za-z_0-9]{0,39}")
 _ANY: Final = 1e30
-ANGLE = Parameter("angle", "phi", "rad", -100.0, 100.0, False, None, "angle of the shaft")
+ANGLE = Parameter("angle", "phi", "rad", -400.0, 400.0, False, None, "angle of the shaft")
 _TIME = Parameter("time", "t", "s", -1e6, 1e6, False, None, "time since the shaft's angle 0")
 #: Turns the times of a diagram into angles.
 RECORDED_AT: Final = Parameter(

@@ -12,7 +12,8 @@ import pytest
 from scipy.integrate import quad
 
 from sprag_study.engine.machine_shaft.checked import check
-from sprag_study.engine.machine_shaft.problems import RelationError
+from sprag_study.engine.machine_shaft.machine import check_structure
+from sprag_study.engine.machine_shaft.problems import RelationError, StructureError
 from sprag_study.engine.machine_shaft.spec import Drive, MachineSpec, OperationChoice, Stage
 from sprag_study.engine.machine_shaft.trajectory import trajectory
 from tests.engine.machine_shaft.machines import PRESS, PRESS_NUMBERS, one
@@ -147,3 +148,95 @@ def test_a_belt_with_a_mass_needs_its_radius() -> None:
         check(spec, numbers | {"drive.inertia": 1.0})
     assert error.value.path == "drive.stages.1.radius"
     check(spec, numbers | {"drive.inertia": 1.0, "drive.stages.1.radius": 0.1})
+
+
+WHEEL: dict[str, Any] = {
+    "drive.flywheel.diameter": 0.8, "drive.flywheel.mass": 40.0, "drive.flywheel.allowed_stress": 3e7
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("shape", ["rim", "disc"])
+@pytest.mark.parametrize("shaft", [0, 1, 2, 3])
+def test_a_flywheel_counts_with_the_square_of_the_speed_of_its_shaft(shape: Any, shaft: int) -> None:
+    """The same machine by hand: the converted inertia on the main shaft, and the speeds of the shaft with it."""
+    stages: tuple[Stage, ...] = ("belt", "screw_nut", "gear")
+    ratio = (12.0, 4.0, 4.0, 1.0)[shaft]
+    train = {"drive.stages.0.ratio": 3.0, "drive.stages.1.lead": 0.01, "drive.stages.2.ratio": 4.0}
+    numbers = PRESS_NUMBERS | train | {"drive.inertia": 8.0, "wanted_irregularity": 0.03}
+    drive = Drive(stages=stages, flywheel=shape, flywheel_shaft=shaft)
+    got = one(replace(PRESS, drive=drive), numbers | WHEEL)
+    own = 40.0 * 0.8**2 / (4.0 if shape == "rim" else 8.0)
+    by_hand = one(replace(PRESS, drive=Drive(stages=stages)), numbers | {"drive.inertia": 8.0 + own * ratio**2})
+    for name, value in by_hand.items():
+        if not math.isnan(value):
+            assert got[name] == pytest.approx(value, rel=1e-12, abs=1e-12), name
+    assert got["flywheel.inertia"] == pytest.approx(own, rel=1e-15)
+    assert got["flywheel.speed"] == pytest.approx(0.4 * ratio * by_hand["omega.max"], rel=1e-13)
+    factor = 1.0 if shape == "rim" else 3.3 / 8.0
+    assert got["flywheel.stress"] == pytest.approx(factor * 7850.0 * got["flywheel.speed"] ** 2, rel=1e-13)
+    assert got["flywheel.margin"] == pytest.approx(math.sqrt(3e7 / got["flywheel.stress"]), rel=1e-13)
+    for name, path in (("mass", "drive.flywheel.mass"), ("diameter", "drive.flywheel.diameter")):
+        enough = one(replace(PRESS, drive=drive), numbers | WHEEL | {path: got[f"flywheel.required_{name}"]})
+        assert enough["irregularity"] == pytest.approx(0.03, rel=1e-9)
+
+
+def test_the_main_shaft_of_a_flywheel_has_the_number_of_the_stages() -> None:
+    stages: tuple[Stage, ...] = ("gear",)
+    numbers = PRESS_NUMBERS | WHEEL | {"drive.stages.0.ratio": 4.0}
+    usual = one(replace(PRESS, drive=Drive(stages=stages, flywheel="rim")), numbers)
+    given = one(replace(PRESS, drive=Drive(stages=stages, flywheel="rim", flywheel_shaft=1)), numbers)
+    assert all(usual[name] == given[name] or math.isnan(usual[name]) for name in usual)
+    with pytest.raises(StructureError, match="from 0, the motor's, to 1, the main shaft"):
+        check_structure(replace(PRESS, drive=Drive(stages=stages, flywheel="rim", flywheel_shaft=2)))
+
+
+def test_a_geared_punch_press_of_shigley_with_the_flywheel_on_the_motor_shaft() -> None:
+    """J. E. Shigley, C. R. Mischke, R. G. Budynas, *Mechanical Engineering Design*, problem 16-28, and its solution.
+
+    A press geared 10:1 punches for half a second every 10 s with 1300 lbf*ft on the crankshaft: between 19 and 20 of
+    its revolutions, and so are the results.
+    """
+    inch_pound = 0.0254 * 4.4482216152605
+    free, stall = 2690.35 / 21.41, 2690.35 * inch_pound
+    spec = MachineSpec(
+        balance="motor", operation=OperationChoice("torque", "steps", steps=1),
+        drive=Drive(motor="linear", stages=("gear",), flywheel="rim", flywheel_shaft=0),
+    )  # fmt: skip
+    numbers = {
+        "drive.motor.no_load_speed": free, "drive.motor.stall_torque": stall, "drive.stages.0.ratio": 10.0,
+        "drive.flywheel.diameter": 1.0, "drive.flywheel.mass": 4.0 * 110.72 * inch_pound,
+        "operation.steps.0.from": 0.0, "operation.steps.0.to": 0.5 * 12.111,
+        "operation.steps.0.value": 1300.0 * 12.0 * inch_pound,
+    }  # fmt: skip
+    short, long = (one(replace(spec, cycle=cycle), numbers) for cycle in (19, 20))
+    periods = [math.tau * cycle / got["omega.mean_time"] for cycle, got in ((19, short), (20, long))]
+    share = (10.0 - periods[0]) / (periods[1] - periods[0])
+    assert 0.0 < share < 1.0
+    between = {name: (1.0 - share) * short[name] + share * long[name] for name in short}
+    assert 10.0 * between["omega.max"] == pytest.approx(124.41, abs=0.02)
+    assert 10.0 * between["omega.min"] == pytest.approx(117.81, abs=0.02)
+    assert between["irregularity"] == pytest.approx(0.0545, abs=1e-4)
+    assert between["energy.fluctuation"] == pytest.approx(88_508.0 * inch_pound, rel=1e-3)
+
+
+@pytest.mark.parametrize("cycle", [13, 60])
+def test_long_cycles_are_many_short_ones(cycle: int) -> None:
+    numbers = PRESS_NUMBERS | {"wanted_irregularity": 0.05}
+    spec = replace(PRESS, operation=replace(PRESS.operation, over="stroke"))
+    numbers |= {"operation.steps.0.from": 0.2, "operation.steps.0.to": 0.9}
+    short, long = one(spec, numbers), one(replace(spec, cycle=cycle), numbers)
+    for name in ("irregularity", "energy.fluctuation", "required_inertia", "power.mean", "omega.max"):
+        assert long[name] == pytest.approx(short[name], rel=1e-9), name
+    assert long["work.drive"] == pytest.approx(cycle * short["work.drive"], rel=1e-11)
+    assert long["balance.work"] < 1e-10
+
+
+def test_one_blow_in_sixty_revolutions_in_closed_form() -> None:
+    """Of a constant torque over half a turn in 60, the flywheel gives the share 1 - 1/120."""
+    spec = replace(PLAIN, cycle=60, operation=OperationChoice("torque", "steps", steps=1))
+    numbers = {"mean_speed": 10.0, "drive.inertia": 50.0, "operation.steps.0.from": 100.0 * math.pi}
+    numbers |= {"operation.steps.0.to": 101.0 * math.pi, "operation.steps.0.value": 600.0}
+    got = one(spec, numbers)
+    assert got["drive_torque.mean"] == pytest.approx(5.0, rel=1e-12)
+    assert got["energy.fluctuation"] == pytest.approx(600.0 * math.pi * (1.0 - 1.0 / 120.0), rel=1e-12)
+    assert got["irregularity"] == pytest.approx(got["energy.fluctuation"] / (50.0 * 100.0), rel=1e-12)

@@ -67,6 +67,20 @@ def test_the_train_has_a_wheel_for_each_shaft_of_its_stages() -> None:
     assert "mechanism.slider_crank.crank" in {each.path for each in mechanism.dimensions}
 
 
+def test_a_flywheel_is_drawn_on_its_shaft() -> None:
+    study = _study("punching_press")
+    assert study.structure is not None
+    places = []
+    for shaft in (0, 1, None):
+        drive = study.structure["drive"] | ({} if shaft is None else {"flywheel_shaft": shaft})
+        train = drawings(replace(study, structure=study.structure | {"drive": drive}))[0]
+        wheels = [float(x) for x in re.findall(r'class="wheel" cx="([\d.]+)"', train.shapes)]
+        (place,) = (float(x) + 6.0 for x in re.findall(r'class="mass" x="([\d.]+)" y="22"', train.shapes))
+        places.append(sum(x < place for x in wheels))
+        assert all(0.0 < each.x < train.width for each in train.dimensions)
+    assert places == [0, 2, 4]
+
+
 def _guides(drawing: Drawing) -> list[str]:
     """The points of each guide."""
     return re.findall(r'class="dashed" points="([^"]*)"', drawing.shapes)

@@ -106,11 +106,12 @@ _DRIVE: Final = FormChoice(
         *map(_motor, MOTORS),
     ),
 )  # fmt: skip
+_ON_SHAFT: Final = FormField("drive/flywheel/shaft", label="Shaft", default="main shaft", example="0")
 _FLYWHEEL: Final = FormChoice(
-    "drive/flywheel", "Flywheel", help="on the main shaft, by its dimensions",
+    "drive/flywheel", "Flywheel", help="by its dimensions",
     options=(
         Option("none", "none"),
-        *(Option(kind, "", (FormField("drive/flywheel/*"),), at="drive/flywheel", is_kind=True)
+        *(Option(kind, "", (FormField("drive/flywheel/*"), _ON_SHAFT), at="drive/flywheel", is_kind=True)
           for kind in ("rim", "disc")),
     ),
 )  # fmt: skip
@@ -207,7 +208,7 @@ FORM: Final = Form(
     with_loads=True,
     front=(
         "mean_speed", "wanted_irregularity", "drive", r"drive\.(inertia|torque(\.\w+)?|flywheel)",
-        r"drive\.motor\.(?!inertia).*", r"drive\.flywheel\.(mass|diameter)",
+        r"drive\.motor\.(?!inertia).*", r"drive\.flywheel\.(mass|diameter|shaft)",
         r"drive\.stages\.N\.(kind|ratio|lead|radius)", r"(parts\.N\.)?(mechanism|operation|crank_angle)",
         r"(parts\.N\.)?mechanism\.\w+\.(?!(kind|bodies|weights|rise|fall|inclination|.*_(centre|inertia|angle))$).*",
         r"(parts\.N\.)?mechanism\.(formula|csv|cam\.\w+_angle|linkage\.(elements|working))",

@@ -45,7 +45,8 @@ _SAME = re.compile(
 #: Code names in one word, which a title has beside the caption of an element.
 _CHOICES = {"slider_crank", "force", "angle", "steps", "constant", "midrange", "resisting", "none"}
 _CHOSEN = {
-    *("cycle", "mean_speed_is", "balance", "balance_side", "phi_c", "drive.motor.kind", "drive.flywheel.kind"),
+    *("cycle", "mean_speed_is", "balance", "balance_side", "phi_c", "drive.motor.kind"),
+    *("drive.flywheel.kind", "drive.flywheel.shaft"),
     *("drive.stages", "mechanism", "operation"),
     *(f"operation.{name}" for name in (*OPERATION_CHOICES, "efficiency_is")),
     *(f"mechanism.{kind}.{name}" for kind, own in MECHANISM_CHOICES.items() for name in own),

@@ -31,7 +31,8 @@ def test_a_machine_goes_through_the_form_unchanged(name: str) -> None:
 def test_choices_that_a_machine_uses_survive_the_form() -> None:
     base = PRESS["base"] | {
         "drive": {
-            "inertia": 20, "torque": {"formula": "k + 0*phi"}, "flywheel": {"kind": "disc", "diameter": 1, "mass": 50}
+            "inertia": 20, "torque": {"formula": "k + 0*phi"}, "stages": [{"kind": "gear", "ratio": 4}],
+            "flywheel": {"kind": "disc", "diameter": 1, "mass": 50, "shaft": 0},
         },
         "balance": "scale", "constants": {"k": 30},
     }  # fmt: skip

@@ -90,6 +90,22 @@ def test_a_flywheel_is_given_by_its_dimensions() -> None:
     assert "/base/drive/flywheel/diameter" in problems({"/base/drive": {"flywheel": {"kind": "disc"}}, "/axes": []})
 
 
+def test_a_flywheel_sits_on_a_shaft_of_the_train() -> None:
+    wheel = {"kind": "rim", "diameter": "0.8 m", "mass": "40 kg"}
+    for shaft, kept in ((..., None), (0, 0), (2, 2), (3, None)):
+        own = wheel if shaft is ... else wheel | {"shaft": shaft}
+        spec = changed({"/base/drive": {"stages": STAGES, "flywheel": own}, "/axes": []})
+        jsonschema.Draft202012Validator(spec_schema()).validate(spec)
+        study = parse_spec(spec).study
+        assert study.structure is not None
+        assert study.structure["drive"].get("flywheel_shaft") == kept
+        chosen = {choice.path: choice.text for choice in part_of("machine-shaft").choices(study, spec)}
+        assert chosen.get("drive.flywheel.shaft") == (None if kept is None else str(kept))
+    for shaft, code in ((4, "out-of-range"), (-1, "out-of-range"), ("main", "wrong-type")):
+        found = problems({"/base/drive": {"stages": STAGES, "flywheel": wheel | {"shaft": shaft}}, "/axes": []})
+        assert found["/base/drive/flywheel/shaft"].code == code
+
+
 def test_the_side_that_is_balanced() -> None:
     given = {"/base/balance": ..., "/base/drive/torque": 100, "/base/balance_side": "operation", "/axes": []}
     parsed = parse_spec(changed(given))
