@@ -16,6 +16,9 @@ GENERATIONS: Final = 1, 10_000
 #: Parameters with tolerances of one study, and its drawn drives.
 MAX_TOLERANCES: Final = 1_000
 MAX_DRIVES: Final = 100_000
+#: Fresh drives of the best designs of a search: unless told, and at most.
+FRESH_DRIVES: Final = 500
+MAX_FRESH_DRIVES: Final = 20_000
 #: Correlations of one study.
 MAX_CORRELATIONS: Final = 1_000
 #: Starts of each case of one study, and initial values that differ between them.

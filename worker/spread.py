@@ -63,10 +63,12 @@ class Spread:
         Row ``k`` belongs to drive ``k + 1``; each column is what the `change` of its tolerance says.
     about : mapping
         How the draws were made, for people, as plain JSON data: ``seed``, ``draws`` (the method), ``correlations``.
+    fresh : int
+        How many of the last drives are fresh ones, which a search runs with its best designs only.
 
     Attributes
     ----------
-    array : float64 array, shape (drives, tolerances), read-only
+    array : float64 array, shape (drives + fresh, tolerances), read-only
     """
 
     def __init__(
@@ -74,10 +76,13 @@ class Spread:
         tolerances: Sequence[Tolerance],
         draws: Sequence[Sequence[float]] | Floats,
         about: Mapping[str, Any] | None = None,
+        fresh: int = 0,
     ) -> None:
         array = np.array(draws, dtype=np.float64)
         if array.ndim != 2 or not array.size or array.shape[1] != len(tolerances):
             raise ValueError("a spread needs a draw of each tolerance for at least one drive")
+        if not 0 <= fresh < len(array):
+            raise ValueError("a spread needs drives that are not fresh")
         if not np.isfinite(array).all():
             raise ValueError("every draw must be a finite number")
         paths = [path for tolerance in tolerances for path in tolerance.paths]
@@ -89,12 +94,13 @@ class Spread:
         self.tolerances = tuple(tolerances)
         self.array = array
         self.about = dict(about or {})
+        self.fresh = fresh
         self._column = {path: k for k, tolerance in enumerate(tolerances) for path in tolerance.paths}
 
     @property
     def drives(self) -> int:
-        """Number of drawn drives; the nominal one is not counted."""
-        return len(self.array)
+        """Number of drawn drives; the nominal one and fresh ones are not counted."""
+        return len(self.array) - self.fresh
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -125,7 +131,7 @@ class Spread:
         kept = [k for k, one in enumerate(self.tolerances) if not set(paths).isdisjoint(one.paths)]
         tolerances = [self.tolerances[k] for k in kept]
         own = [replace(one, paths=tuple(path for path in one.paths if path in paths)) for one in tolerances]
-        return Spread(own, self.array[:, kept], self.about) if own else None
+        return Spread(own, self.array[:, kept], self.about, self.fresh) if own else None
 
     def columns(self, base: Mapping[str, float], columns: Mapping[str, Floats]) -> dict[str, Floats]:
         """Values of all `paths` in cases: path -> array, shape (m,), SI.
@@ -142,7 +148,8 @@ class Spread:
             {"name": one.name, "paths": list(one.paths), "change": one.change, "about": dict(one.about)}
             for one in self.tolerances
         ]
-        return {"items": items, "drives": self.drives, **self.about, "values": packed(self.array.reshape(-1))}
+        fresh = {"fresh": self.fresh} if self.fresh else {}
+        return {"items": items, "drives": self.drives, **fresh, **self.about, "values": packed(self.array.reshape(-1))}
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Spread:
@@ -151,17 +158,18 @@ class Spread:
             Tolerance(str(one["name"]), tuple(one["paths"]), one["change"], dict(one.get("about", {})))
             for one in data["items"]
         ]
-        about = {key: value for key, value in data.items() if key not in {"items", "drives", "values"}}
-        draws = np.asarray(unpacked(data["values"]), dtype=np.float64).reshape(int(data["drives"]), -1)
-        return cls(tolerances, draws, about)
+        about = {key: value for key, value in data.items() if key not in {"items", "drives", "fresh", "values"}}
+        fresh = int(data.get("fresh", 0))
+        draws = np.asarray(unpacked(data["values"]), dtype=np.float64).reshape(int(data["drives"]) + fresh, -1)
+        return cls(tolerances, draws, about, fresh)
 
     def __reduce__(self) -> tuple[type[Spread], tuple[Any, ...]]:
-        return Spread, (self.tolerances, self.array, self.about)
+        return Spread, (self.tolerances, self.array, self.about, self.fresh)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Spread):
             return NotImplemented
-        same = self.tolerances == other.tolerances and self.about == other.about
+        same = (self.tolerances, self.about, self.fresh) == (other.tolerances, other.about, other.fresh)
         return same and np.array_equal(self.array, other.array)
 
     def __hash__(self) -> int:

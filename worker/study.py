@@ -114,7 +114,7 @@ class Study:
         if not self.axes or self.axes[-1].paths != (DRIVE,):
             raise ValueError("the last axis of a study with tolerances is that of its drives")
         numbers = self.axes[-1].array
-        if numbers.min() < 0 or numbers.max() > self.spread.drives or (numbers != np.floor(numbers)).any():
+        if numbers.min() < 0 or numbers.max() > len(self.spread.array) or (numbers != np.floor(numbers)).any():
             raise ValueError("a drive has no draws")
         if not set(self.spread.paths) <= {*self.base, *paths} - {DRIVE, *self.derive}:
             raise ValueError("a tolerance is of a derived or an unknown path")

@@ -83,16 +83,36 @@ class Design(TypedDict):
 
 
 class Generation(TypedDict):
-    """What was known after a generation, or after a round of the polish."""
+    """What was known after a generation, or after a later round."""
 
     round: Annotated[int, Doc("rounds before")]
     generation: Annotated[int, Doc("generations before")]
-    phase: Annotated[str, Doc("what came next: search, polish or ended")]
+    phase: Annotated[str, Doc("what came next: search, polish, fresh or ended")]
     feasible: Annotated[int, Doc("designs within every limit")]
     infeasible: int
     failed: int
     best: Annotated[list[float | None], Doc("best value of each goal within the limits, SI; null: none yet")]
     hypervolume: Annotated[float | None, Doc("what the front dominates, up to a fixed point; null where not known")]
+
+
+class FreshResult(TypedDict):
+    """A quantile or a yield over fresh drives, at each operating point; null where it is not known."""
+
+    values: list[Number]
+    low: Annotated[list[Number], Doc("lower ends of the 95 % intervals")]
+    high: Annotated[list[Number], Doc("upper ends")]
+
+
+class FreshDesign(TypedDict):
+    """One of the best designs with fresh drives, which the search has not seen."""
+
+    design: Annotated[int, Doc("its number")]
+    drives: Annotated[int, Doc("fresh drives at each operating point")]
+    first_case: Annotated[int, Doc("the first of their cases")]
+    goals: Annotated[dict[str, Number], Doc("each goal over the operating points, SI; null where it is missing")]
+    results: Annotated[dict[str, FreshResult], Doc("those of goals and limits that are about the drives, by name")]
+    feasible: Annotated[bool, Doc("whether it is within every limit with fresh drives")]
+    failed: Annotated[bool, Doc("whether all of them fail at an operating point, or a goal is missing")]
 
 
 class FrontReport(TypedDict):
@@ -117,3 +137,6 @@ class FrontReport(TypedDict):
     ]
     designs: Annotated[list[Design], Doc("at most `limit` of the known ones")]
     history: list[Generation]
+    fresh: NotRequired[
+        Annotated[list[FreshDesign], Doc("the best designs with fresh drives; left out: none, or not run yet")]
+    ]

@@ -326,6 +326,28 @@ def show_designs(found: dict[str, Any]) -> None:
     ]
     columns += [(_("feasible"), False), (_("exact"), False), (_("rank"), True), (_("motion"), False)]
     show_table(", ".join(parts), columns, rows)
+    if "fresh" in found and not piped():
+        _show_fresh(found)
+
+
+def _show_fresh(found: dict[str, Any]) -> None:
+    """A line for each value of the best designs with drives that the search has not seen."""
+    units = {item["result"]: item["unit"] for item in (*found["best"], *found["subject_to"])}
+    rows = [
+        (
+            one["design"],
+            name if len(own["values"]) == 1 else _("{name} at {number}", name=name, number=number),
+            *(in_unit(end, units[name]) for end in ends),
+            unit_of(units[name]),
+        )
+        for one in found["fresh"]
+        for name, own in one["results"].items()
+        for number, ends in enumerate(zip(own["values"], own["low"], own["high"], strict=True), 1)
+    ]
+    title = _("{count} drives that the search has not seen", count=found["fresh"][0]["drives"])
+    columns = [(_("design"), True), (_("result"), False), (_("value"), True)]
+    columns += [(_("from"), True), (_("to"), True), (_("unit"), False)]
+    show_table(title, columns, rows)
 
 
 def _limited(found: dict[str, Any]) -> dict[str, str]:

@@ -26,6 +26,14 @@ from sprag_study.service.reading.catalogue import unit_of
 from sprag_study.service.reading.directions import in_words
 from sprag_study.service.reading.reader import Phrase, term
 from sprag_study.service.results.explore import Further
+from sprag_study.service.results.fresh import (
+    Fresh,
+    fresh_cells,
+    fresh_columns,
+    fresh_designs,
+    fresh_json,
+    searched_cases,
+)
 from sprag_study.service.results.regimes import kind_columns
 from sprag_study.worker import models
 from sprag_study.worker.models import WorkerEnding
@@ -81,6 +89,8 @@ class Designs:
         Of each design those at its operating points, of the nominal drive; None for a search of runs of a given time.
     flags : list of lists of str
         Of each design those of all its cases, each once.
+    fresh : tuple of Fresh
+        The best designs of a search that has ended, with fresh drives.
     """
 
     study: Study
@@ -96,6 +106,7 @@ class Designs:
     pending: int
     regimes: list[list[str | None]] | None
     flags: list[list[str]]
+    fresh: tuple[Fresh, ...] = ()
 
     @property
     def counts(self) -> dict[str, int]:
@@ -144,7 +155,8 @@ def designs_of(study: Study, rounds: list[RoundRecord], fetch: Fetch, *, exact: 
     """
     plan = goal_of(study)
     each, drives = plan.cases_each, 1 + plan.drives
-    whole = range(study.cases - study.cases % each)
+    searched = searched_cases(study, rounds)
+    whole = range(searched - searched % each)
     infos = models.study_results(study)
     regime = models.regime_info(infos)
     names = models.with_half_widths([*plan.results, *kind_columns(regime)[:1]], (info.name for info in infos))
@@ -160,6 +172,7 @@ def designs_of(study: Study, rounds: list[RoundRecord], fetch: Fetch, *, exact: 
     numbers_ = np.flatnonzero(known)
     found.cases[:] = numbers_[:, None] * each + np.arange(0, each, drives)
     table = Table(plan, rows)
+    designs = study.points(whole)[::each, : len(plan.vary)]
     goal = found.goals[:, 0] * (-1.0 if plan.best[0].max else 1.0) if plan.best else found.violation
     return Designs(
         study=study,
@@ -175,6 +188,7 @@ def designs_of(study: Study, rounds: list[RoundRecord], fetch: Fetch, *, exact: 
         pending=int(np.count_nonzero(~ended)),
         regimes=None if regime is None else _regimes(regime, values[regime.name].reshape(-1, each)[:, ::drives]),
         flags=[list(dict.fromkeys(name for text in own for name in text.split(",") if name)) for own in flags],
+        fresh=fresh_designs(study, plan, rounds, fetch, names, designs) if plan.fresh else (),
     )
 
 
@@ -245,6 +259,8 @@ def front_json(study_id: str, found: Designs, limit: int = DESIGNS) -> FrontRepo
     }
     if plan.names:
         report["names"] = list(plan.names)
+    if found.fresh:
+        report["fresh"] = [fresh_json(own, [goal.name for goal in plan.best]) for own in found.fresh]
     return report
 
 
@@ -383,13 +399,16 @@ def front_csv(found: Designs, study: Study, shown: Units, limit: int = DESIGNS) 
     header += [name if len(points) == 1 else f"{name}.{number}" for name in found.values for number in points]
     own = found.regimes is not None and not any(item.result == "regime" for item in plan.items)
     header += ["regime" if len(points) == 1 else f"regime.{number}" for number in points if own] + ["flags"]
+    fresh, about_fresh = {one.design: one for one in found.fresh}, fresh_columns(found.fresh, len(points))
+    header += about_fresh
     rows: list[list[Any]] = []
     for position in found.order[:limit].tolist():
         design = cast("dict[str, Any]", design_json(found, position))
         row = [design["design"], design["cases"][0], *(design[name] for name in about), *design["variables"].values()]
         row += design["goals"].values() if len(points) > 1 else ()
         row += chain.from_iterable(design["results"].values())
-        rows.append([*row, *(design["regimes"] if own else ()), " ".join(design["flags"])])
+        row += [*(design["regimes"] if own else ()), " ".join(design["flags"])]
+        rows.append([*row, *fresh_cells(fresh.get(design["design"]), len(about_fresh))])
     columns = dict(zip(header, zip(*rows, strict=True) if rows else [()] * len(header), strict=True))
     units = {one.paths[0]: unit_of(study, one.paths[0]) for one in plan.vary}
     units |= dict(zip((f"{goal.over or plan.over}.{goal.name}" for goal in plan.best), goal_units(study), strict=True))
@@ -398,6 +417,10 @@ def front_csv(found: Designs, study: Study, shown: Units, limit: int = DESIGNS) 
         for number in points
         for name in (*found.values, *(f"{one}.{number}" for one in found.values))
     }
+    units |= {
+        f"fresh.{name}{part}": units[name] for name in (*units,) for part in ("", ".low", ".high")
+        if f"fresh.{name}{part}" in columns
+    }  # fmt: skip
     return exports.read_table(columns, units, shown)
 
 

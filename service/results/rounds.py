@@ -10,6 +10,7 @@ from sprag_study.service.languages import N_, decimal
 from sprag_study.service.reading.reader import Phrase, joined, plural
 from sprag_study.service.reading.wording import percent
 from sprag_study.worker.planning.calibrate.plan import CALIBRATE
+from sprag_study.worker.planning.goals.fresh import FRESH
 from sprag_study.worker.planning.goals.plan import GOAL
 from sprag_study.worker.states import StudyState
 
@@ -127,6 +128,7 @@ def _search(summary: dict[str, Any], units: Sequence[str]) -> list[Phrase]:
     if summary["phase"] != "search":
         parts = [plural("{count} generation", "{count} generations", generation)]
         end = Phrase("finish by derivatives") if "finish" in summary else Phrase("polish of equalities")
+        end = Phrase("best design with fresh drives") if summary["phase"] == FRESH else end
         parts += [] if summary["phase"] == "ended" else [end]
     reached = zip(summary["best"], units or [""] * len(summary["best"]), strict=True)
     best = joined(" / ", (Amount(value, unit, 3) for value, unit in reached if value is not None))

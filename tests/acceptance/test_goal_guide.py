@@ -13,7 +13,10 @@ import pytest
 
 from sprag_study.service.jobs.local import run_here
 from sprag_study.service.presets import preset_text
+from sprag_study.service.reading.quantities import Units
+from sprag_study.service.reading.reader import Reading
 from sprag_study.service.results.fronts import designs_of, front_json
+from sprag_study.service.results.headlines.search import search_headline
 from sprag_study.service.results.rounds import sentence
 from sprag_study.service.spec.document import parse_spec
 from sprag_study.worker.states import StudyState
@@ -44,6 +47,9 @@ def test_the_examples_of_the_guide_have_their_designs(section: str) -> None:
         progress = done.store.studies.progress(done.record.id).rounds
     assert progress is not None
     assert page.split("\n> ")[1].startswith(sentence(progress, StudyState.FINISHED))
+    if "fresh_drives" in page:
+        headline = search_headline(found, over=True).said(Reading(study.model, Units()))
+        assert page.split("\n> ")[2].partition("\n")[0] in headline
     rows = [
         [float(cell) for cell in line.strip("|").split("|")] for line in re.findall(r"^\| \d.*$", page, re.MULTILINE)
     ]

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from scipy.stats import binom, binomtest
 
 from sprag_study.service.results.fronts import designs_of
 from sprag_study.service.spec.design import design_spec
 from sprag_study.service.spec.document import SpecError, parse_spec
 from sprag_study.worker.rounds import Rounds
 from sprag_study.worker.spread import DRIVE
+from sprag_study.worker.study import Study
 from tests.service.rounds import run_round
 from tests.service.searching import rows_of, spec_of
 from tests.service.spec_sample import schema
@@ -37,6 +41,10 @@ def robust(**fields: Any) -> dict[str, Any]:
     return {**spec, "tolerances": tolerances, "drives": DRIVES}
 
 
+#: Fresh drives of the best design.
+FRESH = 30
+
+
 def test_each_design_is_run_with_every_drive_at_every_operating_point() -> None:
     spec = robust()
     schema().validate(spec)
@@ -59,7 +67,7 @@ def test_each_design_is_run_with_every_drive_at_every_operating_point() -> None:
 @pytest.fixture
 def ended(service: Service) -> tuple[Service, str]:
     """Such a study after all its rounds."""
-    study_id = service.submit(robust())
+    study_id = service.submit(robust(fresh_drives=FRESH))
     store = service.store
     number, epoch, planner = store.studies.get(study_id).number, store.work.take_over("test"), Rounds(store.work)
     for _ in range(9):
@@ -78,6 +86,7 @@ def test_the_designs_have_their_quantiles_and_yields(ended: tuple[Service, str])
     assert found["best"][0]["result"] == "efficiency (25 % quantile)"
     assert found["counts"]["known"] == 16
     study = service.store.studies.study(study_id)
+    assert study.cases == 16 * 2 * (DRIVES + 1) + 2 * FRESH
     columns = study.columns(range(study.cases))
     for design in found["designs"]:
         first = design["cases"][0]
@@ -94,12 +103,71 @@ def test_the_designs_have_their_quantiles_and_yields(ended: tuple[Service, str])
         assert service.http.get(f"/studies/{study_id}{page}").status_code == 200
 
 
+def test_the_best_design_has_fresh_drives_and_their_intervals(ended: tuple[Service, str]) -> None:
+    service, study_id = ended
+    report = service.get(f"/studies/{study_id}/front")
+    (fresh,), best = report["fresh"], report["designs"][0]
+    study = service.store.studies.study(study_id)
+    assert (fresh["design"], fresh["drives"]) == (best["design"], FRESH)
+    cases = range(fresh["first_case"], fresh["first_case"] + 2 * FRESH)
+    columns = study.columns(cases)
+    np.testing.assert_array_equal(columns[DRIVE], np.tile(DRIVES + 1.0 + np.arange(FRESH), 2))
+    assert cases.stop == study.cases
+    # Independent draws of a normal distribution of 3 x its deviation, of which no drive of the search is one.
+    factors = columns["excitation.amplitude_x"][:FRESH] / best["variables"]["excitation.amplitude_x"]
+    assert abs(factors.mean() - 1.0) < 4.0 * 0.1 / FRESH**0.5
+    assert study.spread is not None
+    assert len(np.unique(study.spread.array[:, 0])) == DRIVES + FRESH
+    speeds = np.sort(4000.0 * columns["excitation.amplitude_x"][:FRESH])
+    name, share = (limit["result"] for limit in report["subject_to"])
+    own = fresh["results"][name]
+    assert own["values"] == [pytest.approx(speeds[7])] * 2  # number ceil(0.25 x 30) from the lowest
+    # Ranks whose binomial probability is at least 95 % (scipy).
+    first, last = speeds.searchsorted([own["low"][0] - 1e-9, own["high"][0] - 1e-9])
+    assert binom.cdf(last, FRESH, 0.25) - binom.cdf(first, FRESH, 0.25) >= 0.95
+    reached = int((speeds >= 6.0).sum())
+    wilson = binomtest(reached, FRESH).proportion_ci(0.95, "wilson")
+    yields = fresh["results"][share]
+    assert yields["values"] == [pytest.approx(reached / FRESH)] * 2
+    assert (yields["low"][0], yields["high"][0]) == pytest.approx((wilson.low, wilson.high))
+    assert fresh["feasible"] == bool(speeds[7] >= 6.0 and reached >= 0.75 * FRESH)
+    assert fresh["goals"]["efficiency (25 % quantile)"] == pytest.approx(
+        best["goals"]["efficiency (25 % quantile)"], 0.1
+    )
+    text = service.http.get(f"/api/v1/studies/{study_id}/front", params={"format": "csv"}).text
+    header, *lines = csv.reader(io.StringIO(text))
+    at = header.index(f"fresh.{share}.1.low")
+    assert [line[at] != "" for line in lines] == [True] + [False] * 15
+    assert float(lines[0][at]) == pytest.approx(wilson.low)
+    assert lines[0][header.index("fresh.drives")] == str(FRESH)
+    for page in ("", "/document"):
+        assert "With 30 drives that the search has not seen" in service.http.get(f"/studies/{study_id}{page}").text
+
+
+def test_a_search_says_how_many_fresh_drives_it_has() -> None:
+    usual, without = parse_spec(robust()).study, parse_spec(robust(fresh_drives=0)).study
+    assert usual.spread is not None
+    assert usual.plan is not None
+    assert without.plan is not None
+    assert (usual.plan["fresh"], usual.spread.fresh, len(usual.spread.array)) == (500, 500, DRIVES + 500)
+    assert Study.from_text(usual.to_text()) == usual
+    assert "fresh" not in without.to_text()
+    assert without.spread is not None
+    np.testing.assert_array_equal(without.spread.array, usual.spread.array[:DRIVES])
+    assert {key: value for key, value in usual.plan.items() if key != "fresh"} == without.plan
+    more = parse_spec(robust() | {"drives": 2 * DRIVES}).study
+    assert more.spread is not None
+    np.testing.assert_array_equal(more.spread.array[-500:], usual.spread.array[-500:])
+
+
 def test_a_design_is_studied_further_with_the_same_drives(ended: tuple[Service, str]) -> None:
     service, study_id = ended
     spec, study = service.store.studies.spec(study_id), service.store.studies.study(study_id)
     own = parse_spec(design_spec(spec, study, 0)).study
     assert own.shape == (DRIVES + 1,)
-    assert own.spread == study.spread
+    assert own.spread is not None
+    assert study.spread is not None
+    np.testing.assert_array_equal(own.spread.array, study.spread.array[:DRIVES])
     drawn = parse_spec(design_spec(spec, study, 3)).study
     assert drawn.spread is None
     assert drawn.base["shaft.load"] == study.case_parameters(3)["shaft.load"]
@@ -131,6 +199,10 @@ def test_designs_of_unfinished_rounds_are_pending(service: Service) -> None:
         ({"goal": {"subject_to": [{"result": "efficiency", "is": 0.2, "quantile": "5 %"}]}},
          "/goal/subject_to/0/quantile", "conflict"),
         ({"goal": {"population": 100, "generations": 60}}, "/goal/generations", "too-many"),
+        ({"goal": {"fresh_drives": -1}}, "/goal/fresh_drives", "out-of-range"),
+        ({"goal": {"fresh_drives": 20_000, "at": [{"shaft.load": load / 100} for load in range(1, 5)]}},
+         "/goal/fresh_drives", "too-many"),
+        ({"tolerances": ..., "drives": ..., "goal": {"fresh_drives": 10}}, "/goal/fresh_drives", "conflict"),
     ],
 )  # fmt: skip
 def test_what_is_refused_names_its_place(fields: dict[str, Any], pointer: str, code: str) -> None:

@@ -50,6 +50,9 @@ def caption(
         return translate(HALF_WIDTH).format(
             caption=caption(model, name.removesuffix(_HALF_WIDTH), translate, single, joints)
         )
+    result, beginning, about = name.partition(" (")
+    if beginning and about.endswith(")"):  # what a goal is about: ``shaft.speed.mean (5 % quantile)``
+        return f"{caption(model, result, translate, single, joints)} ({about}"
     text, index, part = _caption(model, name)
     if part and part[1] == "0" and part[0] in single and text not in _without_part(model):
         part = None

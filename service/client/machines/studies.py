@@ -63,6 +63,7 @@ class Studies(Draft):
         seed: int | None = None,
         least_gain: Quantity | None = None,
         polish: bool | None = None,
+        fresh_drives: int | None = None,
     ) -> Self:
         """What a design should reach, and what may vary for it.
 
@@ -93,6 +94,9 @@ class Studies(Draft):
             generations: 0 % to 100 %.
         polish : bool, optional
             Whether equalities are met exactly at the end, and one goal is brought to its optimum by derivatives.
+        fresh_drives : int, optional
+            With tolerances: drives that the search has not seen, with which its best designs are run at the end; 0:
+            none.
         """
         return self._choosing(
             goal=known(
@@ -107,6 +111,7 @@ class Studies(Draft):
                 seed=seed,
                 least_gain=least_gain,
                 polish=polish,
+                fresh_drives=fresh_drives,
             )
         )
 

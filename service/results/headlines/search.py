@@ -10,6 +10,7 @@ import numpy as np
 from sprag_study.sentences import Amount, Name, name_of
 from sprag_study.service.reading.catalogue import unit_of
 from sprag_study.service.reading.reader import Phrase, joined, plural, term
+from sprag_study.service.results.fresh import worst_point
 from sprag_study.service.results.fronts import history, worst_of, worst_places
 from sprag_study.service.results.headlines.headline import (
     DIMENSION_DIGITS,
@@ -26,6 +27,7 @@ from sprag_study.service.results.headlines.headline import (
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from sprag_study.service.results.fresh import Fresh, Interval
     from sprag_study.service.results.fronts import Designs
     from sprag_study.worker.models.presentation import Better
     from sprag_study.worker.planning.goals import Goal, Limit
@@ -56,8 +58,12 @@ def search_headline(found: Designs, *, over: bool) -> Headline:
 
 
 def _sentences(found: Designs, best: int, *, over: bool) -> Iterator[Phrase]:
-    """The best value; of one goal also whether the search has converged, and which limits bind."""
+    """The best value, also with fresh drives; of one goal whether the search has converged, and which limits bind."""
     yield _best(found, best)
+    for fresh in found.fresh:
+        if fresh.design == found.numbers[best]:
+            yield _with_fresh(found, fresh)
+            yield NOTHING if fresh.feasible or not found.front.feasible[best] else _OUTSIDE
     if found.front.feasible[best] and len(found.plan.best) == 1:
         yield converged(found, over=over)
         yield _binding(found, best)
@@ -87,6 +93,39 @@ def _best(found: Designs, best: int) -> Phrase:
             first, values=values,
         )  # fmt: skip
     return plural("The only design: {values}.", "The best of {count} designs: {values}.", count, values=values)
+
+
+#: What is said of a best design that fresh drives put outside a limit.
+_OUTSIDE: Final = Phrase(
+    "With them it is outside a limit: the search took the design that its own drives favour. More drives or a stricter "
+    "limit leave it a reserve."
+)
+
+
+def _with_fresh(found: Designs, fresh: Fresh) -> Phrase:
+    """What the best design is worth with drives that the search has not seen, with the intervals."""
+    items = {item.name: item for item in found.plan.items}
+    values = joined("; ", filter(None, (_fresh(found, items[name], own) for name, own in fresh.results.items())))
+    return plural(
+        "With {count} drive that the search has not seen: {values}.",
+        "With {count} drives that the search has not seen: {values}.",
+        fresh.drives, values=values or Phrase("no result"),
+    )  # fmt: skip
+
+
+def _fresh(found: Designs, item: Goal | Limit, own: Interval) -> Phrase:
+    """One value with its interval, at the operating point that is worst."""
+    place = worst_point(item, own.values)
+    ends = (float(part[place]) for part in (own.values, own.low, own.high))
+    value, low, high = (
+        (Amount(100.0 * end, "%", 3) if item.conditions else _amount(found, item.name, end)) for end in ends
+    )
+    if not np.isfinite(own.values[place]):
+        return NOTHING
+    name = Name(item.name, within=True)
+    if not (np.isfinite(own.low[place]) and np.isfinite(own.high[place])):
+        return joined(" ", (name, value))
+    return Phrase("{name} {value} ({low} to {high})", name=name, value=value, low=low, high=high)
 
 
 def _amount(found: Designs, name: str, value: float) -> Amount:

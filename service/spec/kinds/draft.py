@@ -28,6 +28,7 @@ class Draft:
     kind : "refine", "goal" or "calibrate" where the study chooses its own cases, otherwise ""
     axes : None where they could not be read; of a study that chooses its own cases, the ends of what it may choose,
         until its first round is known
+    fresh : drives that are drawn beside those of the spec, for the best designs of a search
     others : as in a `Study`
     """
 
@@ -40,6 +41,7 @@ class Draft:
     run: dict[str, Any] = field(default_factory=dict)
     plan: dict[str, Any] | None = None
     spread: Spread | None = None
+    fresh: int = 0
     sweep: str | None = None
     quantities: tuple[Quantity, ...] = ()
 

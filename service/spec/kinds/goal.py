@@ -23,7 +23,7 @@ from sprag_study.service.spec.kinds.fields import (
     read_value,
 )
 from sprag_study.service.spec.kinds.places import AT, NAME, POINT_NAME, Places
-from sprag_study.service.spec.kinds.robust import QUANTILE, check_drives, read_quantile
+from sprag_study.service.spec.kinds.robust import FRESH, QUANTILE, check_drives, read_fresh, read_quantile
 from sprag_study.service.spec.lists import refuse_mixed
 from sprag_study.service.spec.schema.quantity import QUANTITY
 from sprag_study.service.spec.shares import in_percent
@@ -125,6 +125,7 @@ GOAL: Final = Record(
             "whether equalities are met exactly at the end, and one goal is brought to its optimum by derivatives",
             "flag", default=True,
         ),
+        FRESH.name: FRESH,
     },
     "what a design should reach, and what may vary for it",
     required=("vary",),
@@ -144,8 +145,13 @@ def _read(draft: Draft) -> Finish | None:
     ends = [(tuple(v["paths"]), v.get("values") or (v["low"], v["high"])) for v in variables]
     draft.vary([*ends, *(((path,), [point[path] for point in points]) for path in (points[0] if points else ()))])
 
+    columns = len(variables) + len(points[0] if points else ()) + 1
+    draft.fresh = read_fresh(node, len(GOAL.items(node, "best")), len(points), columns)
+
     def make_plan() -> None:
-        draft.plan = read_goal(node, variables, points, 0 if draft.spread is None else draft.spread.drives)
+        spread = draft.spread
+        drives, fresh = (0, 0) if spread is None else (spread.drives, spread.fresh)
+        draft.plan = read_goal(node, variables, points, drives, fresh)
 
     return make_plan
 
@@ -238,7 +244,7 @@ def _refuse_mixed_points(items: Sequence[Node]) -> None:
 
 
 def read_goal(
-    goal: Node, variables: Variables, points: list[dict[str, float]], drives: int = 0
+    goal: Node, variables: Variables, points: list[dict[str, float]], drives: int = 0, fresh: int = 0
 ) -> dict[str, Any] | None:
     """The plan of a study with a goal as plain JSON data; None, and the faults recorded, where it is invalid.
 
@@ -246,18 +252,19 @@ def read_goal(
     ----------
     goal : the field `goal` of the spec, when the results of the study are known
     variables, points : as `read_variables` and `read_points` give them
-    drives : number of drawn drives; 0 without tolerances
+    drives, fresh : numbers of drawn drives, and of fresh ones for the best designs; 0 without tolerances
     """
     places = Places(goal["at"], GOAL.items(goal, "at"), points)
     best = _read_best(GOAL.items(goal, "best"), places)
     read = [_read_constraint(item, places, robust=True) for item in GOAL.items(goal, "subject_to")]
     constraints = [constraint for constraint in read if constraint]
-    search = {name: field.read(goal) for name, field in GOAL.described.items() if name != "least_gain"}
+    apart = {"least_gain", FRESH.name}
+    search = {name: field.read(goal) for name, field in GOAL.described.items() if name not in apart}
     least_gain = goal["least_gain"].otherwise(GOAL.described["least_gain"].default).share(0.0, 1.0)
     if goal.sound and not best and not constraints:
         goal.refuse("empty", "asks for nothing", None, allowed="`best` or `subject_to`, or both")
     if goal.sound:
-        check_drives(goal.report, best, constraints, drives)
+        check_drives(goal.report, best, constraints, drives, fresh=FRESH.name in goal)
     if not goal.sound:
         return None
     most = search["population"] * search["generations"] * max(len(points), 1) * (1 + drives)
@@ -273,6 +280,7 @@ def read_goal(
         return None
     plan = {"kind": "goal", "vary": variables, "best": best, "subject_to": constraints, "at": points, **search}
     plan |= ({"drives": drives} if drives else {}) | ({"start": start} if start else {})
+    plan |= {"fresh": fresh} if fresh else {}
     plan |= {"names": places.names} if any(places.names) else {}
     return plan | (_of_one_goal(search["polish"], least_gain or 0.0) if len(best) == 1 else {})
 

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
+from sprag_study.sentences import Sentence
+from sprag_study.service.spec.described import Described
 from sprag_study.service.spec.node import Node
+from sprag_study.worker.limits import FRESH_DRIVES, MAX_AXIS_VALUES, MAX_FRESH_DRIVES, MAX_PLANNED_CASES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,6 +24,38 @@ QUANTILE: Final[dict[str, Any]] = {
     'in "5 %"',
 }
 
+FRESH: Final = Described(
+    "fresh_drives", "Fresh drives",
+    "with tolerances: drives that the search has not seen, with which its best designs are run at the end; 0: none",
+    "whole", 0, MAX_FRESH_DRIVES, FRESH_DRIVES,
+)  # fmt: skip
+
+
+def read_fresh(goal: Node, goals: int, points: int, columns: int) -> int:
+    """The number of fresh drives; 0, and a fault recorded, where it is invalid.
+
+    By default they are as many as `FRESH` says, or as there is room for beside the cases of the generations.
+
+    Parameters
+    ----------
+    goal : the field `goal` of the spec
+    goals, points, columns : numbers of goals, of operating points, and of what varies from case to case
+    """
+    # Of each goal the best design, and the best one that meets equalities to 1e-6.
+    each = 2 * max(goals, 1) * max(points, 1)
+    count: int | None = FRESH.read(goal)
+    if count is None:
+        return 0
+    if FRESH.name not in goal:
+        room = MAX_AXIS_VALUES // max(columns, 1) - MAX_PLANNED_CASES
+        return max(0, min(count, MAX_PLANNED_CASES // each, room // each))
+    most = MAX_PLANNED_CASES // each
+    if count > most:
+        message = Sentence("asks for up to {cases} cases at the end of the search", cases=count * each)
+        goal[FRESH.name].refuse("too-many", message, count, allowed=Sentence("at most {drives} drives", drives=most))
+        return 0
+    return count
+
 
 def read_quantile(item: Node) -> dict[str, float] | None:
     """The quantile of a goal or a constraint, by name; empty without one, None, and a fault recorded, if invalid."""
@@ -31,9 +66,17 @@ def read_quantile(item: Node) -> dict[str, float] | None:
 
 
 def check_drives(
-    report: Report, best: Sequence[Mapping[str, Any]], constraints: Sequence[Mapping[str, Any]], drives: int
+    report: Report,
+    best: Sequence[Mapping[str, Any]],
+    constraints: Sequence[Mapping[str, Any]],
+    drives: int,
+    *,
+    fresh: bool = False,
 ) -> None:
-    """Record goals about drives in a study without tolerances, and tolerances without such a goal."""
+    """Record goals about drives in a study without tolerances, and tolerances without such a goal.
+
+    ``fresh``: whether the spec says how many fresh drives there are.
+    """
     about = [
         f"/goal/{part}/{index}/{name}"
         for part, items in (("best", best), ("subject_to", constraints))
@@ -46,6 +89,7 @@ def check_drives(
             "/tolerances", "not-used", "have no effect on this goal", allowed="goals or constraints with `quantile` or "
             "`yield`; a study of a design afterwards shows what tolerances make of it",
         )  # fmt: skip
+    about += [f"/goal/{FRESH.name}"] if fresh else []
     for where in about if not drives else ():
         report.fault(where, "conflict", "is about the drives, of which there is one only",
                      allowed="`tolerances` in the spec")  # fmt: skip

@@ -65,6 +65,8 @@ DRAWS: Final = named(
 )  # fmt: skip
 #: The fields of a spec about tolerances.
 SPREAD: Final[dict[str, Field]] = {"tolerances": _TOLERANCES, **DRAWS, "correlations": CORRELATIONS}
+#: What is added to the seed for the numbers of fresh drives.
+_FRESH: Final = 1
 #: Probability outside the range of a parameter from which on its cut is reported.
 _CUT: Final = 1e-3
 
@@ -88,7 +90,7 @@ class _Nominal:
 
 
 def _read(draft: Draft) -> Finish | None:
-    draft.spread = _read_spread(draft.spec, draft.axes)
+    draft.spread = _read_spread(draft.spec, draft.axes, draft.fresh)
     node = draft.spec["tolerances"]
     if node.given and draft.kind in {"refine", "calibrate"} and draft.axes is not None:
         node.refuse("conflict", "cannot be combined with `refine` or `calibrate`", None,
@@ -101,11 +103,11 @@ def _read(draft: Draft) -> Finish | None:
 DRIVES: Final = Kind(SPREAD, _read, chooses=True)
 
 
-def _read_spread(spec: Node, axes: Sequence[Axis] | None) -> Spread | None:
+def _read_spread(spec: Node, axes: Sequence[Axis] | None, fresh: int) -> Spread | None:
     """The tolerances of a spec and the draws of its drives; None without, or, with the faults recorded, if invalid.
 
     ``axes`` are those of the study without drives (of a study that chooses its own cases, the ends of what it may
-    choose); None where they could not be read.
+    choose); None where they could not be read. ``fresh`` drives are drawn beside those that the spec asks for.
     """
     node = spec["tolerances"]
     if not node.given:
@@ -131,12 +133,23 @@ def _read_spread(spec: Node, axes: Sequence[Axis] | None) -> Spread | None:
             ),
         )  # fmt: skip
         return None
+    room = MAX_AXIS_VALUES // len(drawn) - drives
+    node = spec["goal"]["fresh_drives"]
+    if fresh > room and node.given:
+        message = Sentence("asks for {draws} draws of {tolerances} tolerances", draws=fresh, tolerances=len(drawn))
+        node.refuse("too-many", message, fresh, allowed=Sentence("at most {drives} drives", drives=room))
+        return None
+    fresh = min(fresh, room)
     for one in drawn:
         _warn_of_cut(one)
-    unit = correlated(unit_sample(settings["draws"], drives, settings["seed"], len(drawn)), matrix)
+    unit = unit_sample(settings["draws"], drives, settings["seed"], len(drawn))
+    if fresh:
+        # Independent of each other, as intervals assume, and of the drives of the search.
+        unit = np.concatenate([unit, np.random.default_rng((settings["seed"], _FRESH)).random((fresh, len(drawn)))])
+    unit = correlated(unit, matrix)
     columns = [one.distribution.quantile(unit[:, k]) for k, one in enumerate(drawn)]
     about = {"seed": settings["seed"], "draws": settings["draws"], "correlations": pairs}
-    return Spread([one.tolerance for one in drawn], np.stack(columns, axis=1), about)
+    return Spread([one.tolerance for one in drawn], np.stack(columns, axis=1), about, fresh)
 
 
 def _run_drives(draft: Draft, spread: Spread) -> None:

@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag_study.worker.limits import GENERATIONS, MAX_DRIVES
+from sprag_study.worker.limits import GENERATIONS, MAX_DRIVES, MAX_FRESH_DRIVES
 from sprag_study.worker.planning.goals.linear import weighted_sum
 from sprag_study.worker.spread import DRIVE
 
@@ -221,6 +221,9 @@ class GoalPlan:
         generation.
     drives : int
         Drawn drives of each design at each operating point, beside the nominal one; 0 without tolerances.
+    fresh : int
+        Further drives, which the search has not seen, of its best designs at the end; their numbers follow those of
+        the drawn drives.
     names : tuple of str
         What the operating points are called, "" for those without a name; () where none has one.
     start : tuple of tuple of float
@@ -247,6 +250,7 @@ class GoalPlan:
     growing: bool = False
     least_gain: float = 0.0
     names: tuple[str, ...] = ()
+    fresh: int = 0
 
     def __post_init__(self) -> None:
         _check_variables(self)
@@ -266,6 +270,7 @@ class GoalPlan:
             ("generations", self.generations, GENERATIONS),
             ("seed", self.seed, (0, 2**63 - 1)),
             ("drives", self.drives, (0, MAX_DRIVES)),
+            ("fresh", self.fresh, (0, MAX_FRESH_DRIVES if self.drives else 0)),
         ):
             _check(low <= value <= high, name, value, f"an integer from {low:,} to {high:,}")
         _check(0.0 <= self.least_gain <= 1.0, "least_gain", self.least_gain, "a share from 0 to 1")
@@ -320,6 +325,7 @@ class GoalPlan:
                 seed=int(data["seed"]),
                 polish=bool(data.get("polish", True)),
                 drives=int(data.get("drives", 0)),
+                fresh=int(data.get("fresh", 0)),
                 start=tuple(tuple(float(value) for value in one) for one in data.get("start", ())),
                 finish=bool(data.get("finish", False)),
                 growing=bool(data.get("growing", False)),
@@ -349,6 +355,7 @@ class GoalPlan:
             "seed": self.seed,
             "polish": self.polish,
             **({"drives": self.drives} if self.drives else {}),
+            **({"fresh": self.fresh} if self.fresh else {}),
             **({"start": [list(one) for one in self.start]} if self.start else {}),
             **({"finish": True} if self.finish else {}),
             **({"growing": True} if self.growing else {}),

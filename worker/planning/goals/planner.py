@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from sprag_study.worker.planning.goals.cma import LEAST, LEAST_BEFORE_FINISH, Cma
 from sprag_study.worker.planning.goals.finish import Finish, finish_designs, finish_rounds
+from sprag_study.worker.planning.goals.fresh import FRESH, best_places, most_fresh
 from sprag_study.worker.planning.goals.nsga2 import Nsga2
 from sprag_study.worker.planning.goals.polish import MET, MOST_STARTS, MOST_TRIALS, Polish, polish_designs
 from sprag_study.worker.planning.goals.ranking import ranks
@@ -67,7 +68,8 @@ class GoalPlanner:
 
     One goal is searched for by CMA-ES, several or none by NSGA-II; then equalities are polished, and one goal finished.
 
-    A round is a generation, without the designs that were evaluated before, or a step of the polish or of the finish.
+    A round is a generation, without the designs that were evaluated before, a step of the polish or of the finish, or
+    at the end the best designs with fresh drives.
     Columns of the points are the variables of the plan in their order, then the paths of its operating points, then the
     drive; the cases of a design, one for each operating point and drive, are stored next to each other.
     """
@@ -92,6 +94,9 @@ class GoalPlanner:
         #: Of the proposed designs, those that are not known: their places, and they themselves.
         self._new = np.empty(0, dtype=np.int64)
         self._asked = np.empty((0, self._space.dimensions))
+        #: The best designs, which are asked for with fresh drives, and the keys of those that have them.
+        self._fresh = np.empty((0, self._space.dimensions))
+        self._with_fresh: set[bytes] = set()
         self._next()
 
     @property
@@ -106,13 +111,27 @@ class GoalPlanner:
 
     @property
     def most_cases(self) -> int:
-        """Cases of a search in which no design comes twice, with the longest polish and the longest finish."""
+        """Cases of a search in which no design comes twice, with the longest polish and finish, and fresh drives.
+
+        A run again of failed cases can make another design the best, and have it run with fresh drives, too.
+        """
+        fresh = most_fresh(self.plan) * len(self.plan.at) * self.plan.fresh
+        return self._most_cases_searched + fresh
+
+    @property
+    def _most_cases_searched(self) -> int:
+        """As `most_cases`, without fresh drives."""
         ends = polish_designs(self.plan) + finish_designs(self.plan)
         return (self._most_searched + ends) * self.plan.cases_each
 
     @property
     def most_rounds(self) -> int:
-        """Generations, each with a new design, and the rounds of the polish and of the finish."""
+        """Generations, each with a new design, the rounds of the polish and of the finish, and that of fresh drives."""
+        return self._most_rounds_searched + (1 if self.plan.fresh else 0)
+
+    @property
+    def _most_rounds_searched(self) -> int:
+        """As `most_rounds`, without fresh drives."""
         generations = min(self.plan.generations, self._most_searched)
         return generations + (1 + MOST_TRIALS if polish_designs(self.plan) else 0) + finish_rounds(self.plan)
 
@@ -132,6 +151,10 @@ class GoalPlanner:
         ValueError
             If there are rows of something else.
         """
+        if (fresh := self._space.of_fresh_cases(rows.points)) is not None:
+            self._with_fresh.update(keys(fresh))
+            self._next()
+            return
         designs, coordinates = self._space.coordinates(rows.points)
         outputs = outputs_of(self.plan, rows)
         self._known.update(zip(keys(designs), outputs, strict=True))
@@ -148,7 +171,9 @@ class GoalPlanner:
         derivatives = self._end is not None and self._end.differentiates and len(self._asked) > 0
         finishing = isinstance(self._end, Finish)
         summary = self._record.summary(self._phase(), derivatives=derivatives, finishing=finishing)
-        return Step(self._space.cases(self._asked), summary)
+        return Step(
+            self._space.fresh_cases(self._fresh) if len(self._fresh) else self._space.cases(self._asked), summary
+        )
 
     def best(self) -> tuple[Floats, Scores]:
         """The best designs of the search so far, the survivors of its last generation: variables in SI and scores."""
@@ -156,6 +181,8 @@ class GoalPlanner:
         return self._space.designs(coordinates), scores
 
     def _phase(self) -> str:
+        if len(self._fresh):
+            return FRESH
         if not len(self._asked):
             return "ended"
         return "search" if self._end is None else "polish"
@@ -194,12 +221,20 @@ class GoalPlanner:
         self._record.generation(new, self._search.survivors()[1], -(-self._spent // self.plan.population))
 
     def _next(self) -> None:
+        """Propose what is asked for next: designs, or once there is none, or fresh drives had their turn, these."""
+        if self._with_fresh:
+            self._propose(self._proposed[:0])
+        else:
+            self._search_on()
+        self._fresh = self._unseen() if self.plan.fresh and not len(self._asked) else self._fresh[:0]
+
+    def _search_on(self) -> None:
         """Propose until there is something new to ask for, or the end."""
         while True:
             left = self.plan.population * self.plan.generations - self._spent
             settled = self.plan.least_gain > 0.0 and self._search.settled(self.plan.least_gain)
             searching = left > 0 and self._idle < _IDLE and not settled
-            if self._rounds >= self.most_rounds:
+            if self._rounds >= self._most_rounds_searched:
                 self._propose(self._proposed[:0])
                 return
             if searching and len(self._known) != self._space.size:
@@ -209,7 +244,7 @@ class GoalPlanner:
                 return
             else:
                 self._propose(self._end_begun().propose())
-            if self._cases + len(self._asked) * self.plan.cases_each > self.most_cases:
+            if self._cases + len(self._asked) * self.plan.cases_each > self._most_cases_searched:
                 self._propose(self._proposed[:0])
                 return
             if len(self._asked):
@@ -239,13 +274,26 @@ class GoalPlanner:
             self._end = self._finish()
         return self._end
 
+    def _designs(self) -> tuple[Floats, Floats]:
+        """All designs but those that served derivatives only, in their order, and the outputs of each."""
+        known = [(key, outputs) for key, outputs in self._known.items() if key not in self._aside]
+        designs = np.frombuffer(b"".join(key for key, _ in known)).reshape(len(known), -1)
+        return designs, np.array([own for _, own in known])
+
+    def _unseen(self) -> Floats:
+        """The best designs, as `best_places` names them, that were not run with fresh drives."""
+        if not self._known:
+            return self._proposed[:0]
+        designs, outputs = self._designs()
+        best = designs[best_places(self.plan, outputs)]
+        return best[[key not in self._with_fresh for key in keys(best)]]
+
     def _finish(self) -> Finish:
         """The finish of the best design known: one whose equalities are met to 1e-6 where there is one."""
-        known = [(key, outputs) for key, outputs in self._known.items() if key not in self._aside]
-        outputs = np.array([own for _, own in known])
+        designs, outputs = self._designs()
         scores = judge(self.plan, outputs, equality=MET)
         exact = bool(scores.feasible.any())
         best = int(ranks(scores if exact else judge(self.plan, outputs)).argmin())
-        design = np.frombuffer(known[best][0], dtype=np.float64)[None]
+        design = designs[best][None]
         place = self._space.coordinates(self._space.cases(design))[1][0]
         return Finish(self.plan, self._space, place, outputs[best], exact=exact)

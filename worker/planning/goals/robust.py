@@ -52,17 +52,24 @@ class Table:
         if item.conditions:
             share = np.asarray(self._held(item.conditions).sum(axis=1) / self._plan.drives)
             return np.repeat(share[:, None], self._shape[1], axis=1)
-        results = self._results(item.result, limit)
         if item.quantile is None:
-            nominal: Floats = results[:, :, 0]
+            nominal: Floats = self._results(item.result, limit)[:, :, 0]
             return nominal
-        worst = -math.inf if item.upwards else math.inf
-        drawn = np.where(self.ok[:, :, 1:] & ~np.isnan(results[:, :, 1:]), results[:, :, 1:], worst)
+        drawn = self.drawn(item, limit)
         # The least value that at least this share of the drives does not exceed: no arithmetic, so no rounding.
         place = max(math.ceil(item.quantile * self._plan.drives - 1e-9), 1) - 1
         value: Floats = np.sort(drawn, axis=2)[:, :, place].copy()
         value[~np.isfinite(value)] = np.nan
         return value
+
+    def drawn(self, item: Goal | Limit, limit: Limit | None = None) -> Floats:
+        """The result of a goal or a limit in each drawn drive, the worst where it is missing.
+
+        Shape (designs, points, drives).
+        """
+        results = self._results(item.result, limit)[:, :, 1:]
+        worst = -math.inf if item.upwards else math.inf
+        return np.where(self.ok[:, :, 1:] & ~np.isnan(results), results, worst)
 
     def _results(self, name: str, limit: Limit | None = None) -> Floats:
         values = np.where(self._rows.ok & np.isfinite(self._rows.values[name]), self._rows.values[name], np.nan)

@@ -35,7 +35,9 @@ class Space:
         self._vary = plan.vary
         self._low = np.array([one.low for one in plan.vary])
         self._high = np.array([one.high for one in plan.vary])
-        self._at = _cases_of_a_design(plan)
+        self._at = _cases_of_a_design(plan, np.arange(1.0 + plan.drives))
+        fresh = 1.0 + plan.drives + np.arange(float(plan.fresh))
+        self._fresh = _cases_of_a_design(plan, fresh)[: fresh.size * len(plan.at)]
         self.dimensions = len(plan.vary)
         self.counts = np.array([len(one.values) for one in plan.vary], dtype=np.int64)
         self.size = math.prod(self.counts.tolist()) if self.counts.all() else None
@@ -72,6 +74,17 @@ class Space:
         rows = np.repeat(designs, points, axis=0)
         return np.hstack([rows, np.tile(self._at.reshape(points, -1), (len(designs), 1))])
 
+    def fresh_cases(self, designs: Floats) -> Floats:
+        """The cases of designs with fresh drives, in the order of ``cases``."""
+        points = len(self._fresh)
+        return np.hstack([np.repeat(designs, points, axis=0), np.tile(self._fresh, (len(designs), 1))])
+
+    def of_fresh_cases(self, cases: Floats) -> Floats | None:
+        """The designs of whole sets of cases with fresh drives; None for any others."""
+        designs = cases[:: max(len(self._fresh), 1), : self.dimensions]
+        same = len(self._fresh) > 0 and np.array_equal(self.fresh_cases(designs), cases)
+        return designs if same else None
+
     def coordinates(self, cases: Floats) -> tuple[Floats, Floats]:
         """The designs of whole sets of cases, and coordinates of them, both of shape (designs, dimensions).
 
@@ -101,12 +114,11 @@ class Space:
         return np.asarray(coordinates)
 
 
-def _cases_of_a_design(plan: GoalPlan) -> Floats:
-    """Operating point and drive of each case of a design, shape (cases, paths)."""
+def _cases_of_a_design(plan: GoalPlan, drives: Floats) -> Floats:
+    """Operating point and drive of each case of a design with those drives, shape (cases, paths)."""
     points = np.array([[point[path] for path in plan.at_paths] for point in plan.at]).reshape(len(plan.at), -1)
     if not plan.drives:
         return points
-    drives = np.arange(1.0 + plan.drives)
     return np.column_stack([np.repeat(points, drives.size, axis=0), np.tile(drives, len(points))])
 
 

@@ -95,9 +95,8 @@ def refine_fields() -> dict[str, Field]:
 
 def search_fields() -> list[Field]:
     """The fields of a search that take one number each."""
-    return [
-        described(goal.GOAL.described[name], "/goal") for name in ("population", "generations", "seed", "least_gain")
-    ]
+    names = ("population", "generations", "seed", "least_gain", "fresh_drives")
+    return [described(goal.GOAL.described[name], "/goal") for name in names]
 
 
 def sample_field() -> Field:
