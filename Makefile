@@ -12,11 +12,10 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input --quiet --qui
 # The tests start many processes: compiling all modules anew in each would be a third of their time.
 unexport PYTHONDONTWRITEBYTECODE
 
-# mypy and the kernels, which come first, take longer than the others together.
-CHECKS := mypy ruff imports reference catalogues collect
+CHECKS := ruff imports reference catalogues collect
 SIDE_BY_SIDE = $(MAKE) --no-print-directory --jobs 2 $(if $(filter output-sync,$(.FEATURES)),--output-sync)
 
-.PHONY: help demo test check kernels bounds serve docs dist clean $(CHECKS)
+.PHONY: help demo test check kernels bounds serve docs dist clean mypy $(CHECKS)
 
 help:
 	@echo "make demo [EXIT=1]   set up, run the example study over HTTP, show its curve, then serve (or stop)"
@@ -46,13 +45,16 @@ dist: docs
 	@ls dist
 
 # The tests of one file share processes and servers, so they stay together, as do some files (TOGETHER in tests/conftest.py).
-# Many wait for processes of the program, so that three run side by side even on two cores.
+# Many wait for processes of the program, so that three run side by side even on two cores. mypy takes longer than the other
+# checks together, and one core: the tests have the other one meanwhile. What it has found is told after them.
 test: $(DEV)
 	@$(SIDE_BY_SIDE) kernels $(CHECKS)
-	$(BIN)/python -m pytest --numprocesses 3 --dist loadfile --no-loadscope-reorder
+	@$(BIN)/mypy >$(VENV)/types 2>&1 & types=$$!; \
+	$(BIN)/python -m pytest --numprocesses 3 --dist loadfile --no-loadscope-reorder; tests=$$?; \
+	wait $$types || { cat $(VENV)/types; exit 1; }; exit $$tests
 
 check: $(DEV)
-	@$(SIDE_BY_SIDE) $(CHECKS)
+	@$(SIDE_BY_SIDE) mypy $(CHECKS)
 
 ruff: $(DEV)
 	$(BIN)/ruff check .
