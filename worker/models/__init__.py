@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import platform
 from contextlib import suppress
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from sprag_study.engine import ENGINE_VERSION, Ending, Run, Span
@@ -316,8 +317,12 @@ def numbered_by(model: str, variant: str) -> str | None:
 
 def result_catalogue(model: str) -> tuple[ResultInfo, ...]:
     """Every result of ``model``, with placeholders as in `parameter_catalogue`."""
-    known = model_of(model)
-    return with_shares(known.result_catalogue(), known.presentation.shares)
+    return _result_catalogue(model_of(model))
+
+
+@cache
+def _result_catalogue(model: Model) -> tuple[ResultInfo, ...]:
+    return with_shares(model.result_catalogue(), model.presentation.shares)
 
 
 def model_results(study: Study) -> tuple[ResultInfo, ...]:

@@ -105,6 +105,10 @@ class Model(Protocol):
     A subclass must define ``name`` and every method without a body here.
     """
 
+    def __hash__(self) -> int:
+        """There is one object of each model, by which catalogues are kept."""
+        return id(self)
+
     @property
     def name(self) -> str:
         """Name of the model in specs, such as "vibration-drive"."""

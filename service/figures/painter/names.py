@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -26,6 +27,8 @@ _FAR: Final = 26.0
 _HEIGHT: Final = 12.0
 #: Places along a curve at which its name may stand.
 _PLACES: Final = 24
+#: Places that are compared with the other curves in one go: often one of the first is free.
+_AT_ONCE: Final = 12
 
 
 class Box(NamedTuple):
@@ -94,7 +97,7 @@ def clearest(places: Sequence[Box], lines: Sequence[Numbers], taken: Sequence[Bo
     """
     free = [box for box in places if not any(box.touches(other) for other in taken)] or [places[-1]]
     points = np.concatenate([*lines, np.empty((0, 2))])
-    clear = [distance(box, points) for box in free]
+    clear = distances(free, points)
     return next((box for box, far in zip(free, clear, strict=True) if far >= _NEAR), free[int(np.argmax(clear))])
 
 
@@ -102,15 +105,18 @@ def _best(
     name: str, own: Numbers, alien: Numbers, boxes: Sequence[Box], size: tuple[float, float], *, bold: bool
 ) -> Box | None:
     """The place of a name that is farthest from other curves; of equal ones the first."""
+    places = _places(text_width(name, SMALL, bold=bold), own, size)
     best, clear = None, _NEAR
-    for box in _places(text_width(name, SMALL, bold=bold), own, size):
-        near = distance(box, own)
-        if near < _NEAR - 1.0 or any(box.touches(other) for other in boxes):
-            continue
-        free = min(distance(box, alien), _FAR)
-        # Its own curve is clearly the nearest one.
-        if free > max(clear + 0.5, near + _NEAR):
-            best, clear = box, free
+    while block := list(islice(places, _AT_ONCE)):
+        vacant = [box for box in block if not any(box.touches(other) for other in boxes)]
+        nears = distances(vacant, own)
+        some = [(box, near) for box, near in zip(vacant, nears, strict=True) if near >= _NEAR - 1.0]
+        rooms = distances([box for box, _ in some], alien)
+        for (box, near), far in zip(some, rooms, strict=True):
+            room = min(far, _FAR)
+            # Its own curve is clearly the nearest one.
+            if room > max(clear + 0.5, near + _NEAR):
+                best, clear = box, room
         if clear >= _FAR:
             break
     return best
@@ -129,14 +135,19 @@ def _places(width: float, own: Numbers, size: tuple[float, float]) -> Iterator[B
                     yield box
 
 
-def distance(box: Box, points: Numbers) -> float:
-    """Pixels from a box to the nearest of some points."""
-    if not points.size:
-        return _FAR
-    x, y = points[:, 0], points[:, 1]
-    across = np.maximum(np.maximum(box.left - x, x - box.right), 0.0)
-    up = np.maximum(np.maximum(box.top - y, y - box.bottom), 0.0)
-    return float(np.sqrt((across**2 + up**2).min()))
+def distances(boxes: Sequence[Box], points: Numbers) -> list[float]:
+    """Pixels from each box to the nearest of some points, shape (points, 2)."""
+    if not points.size or not boxes:
+        return [_FAR] * len(boxes)
+    x, y = points.T
+    left, top, right, bottom = np.array(boxes).T[:, :, None]
+    across, up = np.clip(x, left, right), np.clip(y, top, bottom)
+    across -= x
+    up -= y
+    across *= across
+    up *= up
+    across += up
+    return np.sqrt(across.min(axis=1)).tolist()  # type: ignore[no-any-return]
 
 
 def dense(x: Numbers, y: Numbers) -> Numbers:

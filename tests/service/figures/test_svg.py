@@ -12,7 +12,7 @@ import pytest
 
 from sprag_study.service.figures.figure import PALETTE, Figure, Fill, Line, Note, Panel, Quantity, line_colours
 from sprag_study.service.figures.painter.elements import SMALL, lines_of, text_width
-from sprag_study.service.figures.painter.names import Box, dense, distance
+from sprag_study.service.figures.painter.names import Box, dense, distances
 from sprag_study.service.figures.painter.scales import Scale, rounded_scale, tick_text
 from sprag_study.service.figures.svg import picture_svg, spark, svg
 from sprag_study.service.reading.reader import Phrase
@@ -158,7 +158,7 @@ def test_a_number_at_a_point_stands_where_no_curve_runs() -> None:
     (path,) = re.findall(r'<path d="([^"]+)"[^>]* data-line="power"', drawn)
     points = np.array(re.findall(r"-?[\d.]+", path), dtype=np.float64).reshape(-1, 2)
     box = Box(left, base - 11.0, left + text_width("3.37 W", SMALL), base + 3.0)
-    assert distance(box, dense(points[:, 0], points[:, 1])) >= 2.9
+    assert distances([box], dense(points[:, 0], points[:, 1]))[0] >= 2.9
 
 
 def test_curves_are_named_as_far_as_names_fit_and_a_legend_has_the_others() -> None:

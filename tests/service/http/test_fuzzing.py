@@ -33,6 +33,15 @@ HEAVY = {
         (
             *("get_transient", "get_forces", "get_basin", "get_trajectory", "get_section", "get_branch", "get_strobes"),
             *("get_duty", "get_engagements", "get_yield", "get_exploration", "get_ribbon", "get_answers", "get_front"),
+            *("get_map", "get_sensitivity", "get_calibration"),
+        ),
+        ("coverage",),
+    ),
+    # Of bodies those of `change_study`, `create_token` and `put_components` stand for the others.
+    **dict.fromkeys(
+        (
+            *("fit_clutch", "select_cases", "narrow_study", "run_longer", "save_view", "change_view"),
+            *("add_user", "change_user", "hand_over_user"),
         ),
         ("coverage",),
     ),

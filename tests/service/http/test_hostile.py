@@ -57,6 +57,9 @@ BODIES = {
         {**SPEC, "axes": [{"path": "../../../etc/passwd", "values": [1]}]}
     ).encode(),
 }
+#: Bodies whose characters are odd or many.
+ODD = ("long integer", "too long integer", "lone surrogate", "nul", "many axes", "path in the name of a parameter")
+LONGEST_FIELD = 200_000
 TARGETS = ("/api/v1/studies", "/api/v1/studies:preview", "/api/v1/clutch-fits", "/api/v1/schedules")
 
 
@@ -75,8 +78,10 @@ def test_a_hostile_body_is_refused_by_a_short_problem(service: Service, name: st
 @pytest.mark.parametrize("name", [name for name in BODIES if name not in ("nothing", "deep lists", "deep objects")])
 def test_a_hostile_spec_is_no_matter_for_the_form(service: Service, name: str) -> None:
     text = BODIES[name].decode("utf-8", "replace")
-    for field in ("/text", "/base/shaft/load", "/name", "/axes/0/values", "axes", "pendulums"):
-        answer = service.http.post("/new", data={field: text[:900_000], "do": "check", "format": "json"})
+    # Fields take any text: of bodies that are wrong as JSON only, the text of a spec is enough.
+    others = ("/base/shaft/load", "/name", "/axes/0/values", "axes", "pendulums") if name in ODD else ()
+    for field in ("/text", *others):
+        answer = service.http.post("/new", data={field: text[:LONGEST_FIELD], "do": "check", "format": "json"})
         assert answer.status_code in (200, 413, 422), (field, answer.text[:300])
 
 
@@ -90,7 +95,7 @@ TEXTS = (
 @pytest.mark.parametrize("text", TEXTS)
 def test_a_hostile_field_of_a_schedule_is_told_beside_it(service: Service, text: str) -> None:
     source = f"study {service.submit()}"
-    for field in ("source", "name", "zone", "cron", "at", "window_begin", "window_end", "priority", "when"):
+    for field in ("source", "name", "zone", "cron", "at", "window_begin", "priority", "when"):
         form = {"source": source, **FORM, "when": "at" if field == "at" else "cron", field: text}
         answer = service.http.post("/nights/new", data=form)
         assert answer.status_code in (303, 422), (field, answer.text[:300])

@@ -19,7 +19,7 @@ from sprag_study.service.http.app import create_app
 from sprag_study.service.http.current import knowing
 from sprag_study.service.http.prefix import here
 from sprag_study.service.http.web.templates import _TRANSLATED, Addresses, _templates
-from sprag_study.service.presets import preset_names, preset_text
+from sprag_study.service.presets import preset_text
 from sprag_study.service.settings import Settings, UnsafeSettingsError
 from sprag_study.service.spec.document import load_spec
 from tests.service.conftest import PortalTransport, Service
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from anyio.from_thread import BlockingPortal
 
 OWN = "/sprag"
+#: What pages differ by: one axis and several, several motions, drawn drives, parts of a machine, a search.
+PRESETS = ("one_pendulum", "two_pendulums", "two_motions", "tolerances", "question_masses", "least_flywheel")
 #: Attributes, and a header, with addresses that are asked for.
 FOLLOWED = {"href", "src", "location", "data-figure"}
 #: Attributes with text of users and names of fields, which may begin with "/".
@@ -72,7 +74,7 @@ class OnlyBelow:
 
 @pytest.fixture
 def below(settings: Settings, connect: Callable[..., httpx.Client]) -> Iterator[tuple[Service, OnlyBelow]]:
-    """A service at /sprag with studies of every preset."""
+    """A service at /sprag."""
     from sprag_study.service.http.app import chunking
     from sprag_study.service.storage.store import Store
     from tests.service.conftest import InThread
@@ -95,7 +97,7 @@ def kind_of(address: str) -> str:
 def test_every_address_of_every_page_has_the_prefix(below: tuple[Service, OnlyBelow]) -> None:
     """From page to page along every link, picture, script and figure that there is; all are answered."""
     service, proxy = below
-    for name in preset_names():
+    for name in PRESETS:
         file, text = preset_text(name)
         spec = load_spec(text, "toml" if file.endswith("toml") else "json")
         study = service.submit(spec)

@@ -9,11 +9,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any, Final, Literal
 
 from sprag_study.service.http.web.form.entries import count_in
 from sprag_study.service.http.web.form.fields import FORM_MODEL, Choice, Field, Groups, described, field_for, label_of
-from sprag_study.service.languages import _
+from sprag_study.service.languages import _, current
 from sprag_study.service.reading.reader import part_label, shown
 from sprag_study.service.reading.wording import words
 from sprag_study.service.spec.described import Described, below
@@ -22,7 +23,7 @@ from sprag_study.service.spec.machine.registry import part_of
 from sprag_study.service.spec.node import Node
 from sprag_study.service.spec.report import Report
 from sprag_study.worker import models
-from sprag_study.worker.models import Parameter
+from sprag_study.worker.models import Model, Parameter
 from sprag_study.worker.models import form as data
 from sprag_study.worker.models.parameters import general_path, model_parameter
 
@@ -135,7 +136,13 @@ def rows_of(values: Mapping[str, str], rows: data.Rows) -> int:
 
 def blocks(values: Mapping[str, str]) -> list[Block]:
     """The blocks of the machine in their order."""
-    return list(_Machine(values).blocks())
+    return list(_blocks(current(), models.model_of(model_name(values)), frozenset(values.items())))
+
+
+@lru_cache(maxsize=8)
+def _blocks(_language: str, _model: Model, values: frozenset[tuple[str, str]]) -> tuple[Block, ...]:
+    """What `blocks` gives: a page asks ten times for the blocks of one form."""
+    return tuple(_Machine(dict(values)).blocks())
 
 
 def entries(values: Mapping[str, str], *, hidden: bool = False) -> Iterator[Entry]:
