@@ -28,7 +28,7 @@ def estimate_seconds(model: MachineSpec, *, with_loads: bool = False) -> float:
     parts = [model.drive, *(own for part in every for own in (part.mechanism, part.operation))]
     panels = PANELS * model.cycle + sum(len(part.table.rows) for part in parts if part.table is not None)
     # Dead centres and kinks of each further part are cuts.
-    panels += 2 * model.cycle * (len(every) - 1)
+    panels += 2 * sum(part.turns_in(model.cycle) for part in every[1:])
     factor = 8.0 if model.balance == "motor" else _COST[model.mean_speed_is]
     factor += sum(_formula_cost(part.formula, model.constants) for part in parts if part.formula is not None)
     factor += _PART * (len(every) - 1)

@@ -99,6 +99,7 @@ def check_structure(spec: MachineSpec) -> None:
             Sentence("A machine has either parts or a mechanism and an operation of its own, not both.")
         )
     for _, part in spec.every_part():
+        _check_shaft(part, spec.cycle)
         _check_part(part)
     # The parts are built once with arbitrary valid numbers, so that tables and formulas are read.
     columns = {p.path: p.default if p.default is not None else 1.0 for p in parameters(spec)}
@@ -108,6 +109,24 @@ def check_structure(spec: MachineSpec) -> None:
             Sentence(
                 "The formula of an operation uses t, the time in which the shaft comes to phi at its mean speed; with "
                 "a motor that speed is not known before. Give the operation over phi."
+            )
+        )
+
+
+def _check_shaft(part: PartChoice, cycle: int) -> None:
+    turns = part.turns_in(cycle)
+    if turns not in REVOLUTIONS:
+        raise StructureError(
+            Sentence(
+                "A part turns 1 to {most} times in a cycle, not {given} times.", most=max(REVOLUTIONS), given=str(turns)
+            )
+        )
+    if part.cycle is not None and (part.cycle < 1 or turns % part.cycle):
+        raise StructureError(
+            Sentence(
+                "A part that turns {turns} times in a cycle of the machine cannot repeat itself every {given} turns.",
+                turns=str(turns),
+                given=str(part.cycle),
             )
         )
 
@@ -328,7 +347,7 @@ class Machine:
             angle, before, after = (float(values[0]) for values in jumps)
             if np.isnan(angle):
                 continue
-            end = min(angle, self.cycle - angle) < 1e-6
+            end = min(angle, part.cycle - angle) < 1e-6
             message = (
                 Sentence(
                     "The inertia does not close on itself: it begins with {after} and ends, a cycle later, with "

@@ -303,7 +303,7 @@ def _mechanism(choice: MechanismChoice) -> tuple[Parameter, ...]:
 
 def _part(prefix: str, part: PartChoice, cycle: int) -> tuple[Parameter, ...]:
     """Parameters of a mechanism and its operation; with a crank angle where it is one of several."""
-    own = (*_mechanism(part.mechanism), *_operation(part.operation, cycle))
+    own = (*_mechanism(part.mechanism), *_operation(part.operation, part.cycle_in(cycle)))
     if not prefix:
         return own
     return tuple(replace(entry, path=prefix + entry.path) for entry in (_CRANK_ANGLE, *own))

@@ -1,7 +1,8 @@
 """A mechanism on the main shaft with its operation, at its crank angle: its inertia and its torques on the shaft.
 
-A machine has one such part or several. The angle of a part is that of the shaft plus its crank angle, counted over the
-whole cycle: the mechanism stands at that angle, and the diagram of the operation is read at it.
+A machine has one such part or several. The angle of a part is that of the shaft, times the ratio of its own shaft,
+plus its crank angle, counted over its cycle: the mechanism stands at that angle, and the diagram of the operation is
+read at it.
 """
 
 from collections.abc import Mapping
@@ -133,16 +134,25 @@ class ShaftPart:
     prefix : str
         Of the paths of its numbers: ``parts.0.``, or empty for the only one of a machine.
     revolutions : int
-        Of a cycle.
+        Of a cycle of the main shaft.
     columns : Columns
         Of the machine.
     pace : array, shape (cases or 1, 1, 1)
-        Speed of the shaft in rad/s for formulas where no other is given.
+        Speed of the main shaft in rad/s for formulas where no other is given.
+
+    Attributes
+    ----------
+    cycle : float
+        Angle in rad of the part's shaft after which the part repeats itself.
+    ratio : float
+        Speed of the part's shaft over that of the main shaft.
     """
 
     def __init__(self, choice: PartChoice, prefix: str, revolutions: int, columns: Columns, pace: Floats) -> None:
         self.choice, self.prefix, self.cases = choice, prefix, columns.cases
-        self._revolutions, self.cycle = revolutions, _TURN * revolutions
+        self.ratio = choice.turns_in(revolutions) / revolutions
+        self._revolutions = choice.cycle_in(revolutions)
+        self._repeats, self.cycle = choice.turns_in(revolutions) // self._revolutions, _TURN * self._revolutions
         self._ahead = columns.values[f"{prefix}crank_angle"] if prefix else None
         self._gravity, self._constants = columns.values["gravity"], columns.under("constants.")
         self.mechanism = mechanism_of(choice.mechanism)
@@ -156,22 +166,26 @@ class ShaftPart:
         self.inertia_formula = Expression(text, names) if choice.mechanism.kind == "formula" else None
         self._stroke = None if self.mechanism is None else Stroke.of(self.mechanism, self.values)
         own = columns.under(f"{prefix}operation.")
-        self._operation = Operation(choice.operation, revolutions, own, self._constants, self._stroke, pace)
-        self._pace = pace
+        self._pace = self.ratio * pace
+        self._operation = Operation(choice.operation, self._revolutions, own, self._constants, self._stroke, self._pace)
 
     def own_angle(self, phi: Floats) -> Floats:
         """Angle of the part, 0 .. cycle, at angles of the shaft."""
-        return phi if self._ahead is None else np.asarray(np.mod(phi + self._ahead, self.cycle))
+        return phi if self._ahead is None else np.asarray(np.mod(self.ratio * phi + self._ahead, self.cycle))
 
     def shaft_angle(self, own: Floats) -> Floats:
-        """Angle of the shaft, 0 .. cycle, at angles of the part (cases or 1, n)."""
-        return own if self._ahead is None else np.asarray(np.mod(own - self._ahead[:, 0, :], self.cycle))
+        """Angles of the shaft in its cycle at angles of the part (cases or 1, n): all at which the part stands so."""
+        if self._ahead is None:
+            return own
+        back, whole = own - self._ahead[:, 0, :], self.cycle * self._repeats
+        every = [np.mod(back + self.cycle * k if k else back, whole) / self.ratio for k in range(self._repeats)]
+        return np.concatenate(every, axis=1)
 
     def unassembled(self) -> Floats:
         """First angle of the shaft at which the mechanism cannot be assembled, (cases,); NaN where it always can."""
         if self.mechanism is None:
             return np.full(self.cases, np.nan)
-        return np.broadcast_to(self.mechanism.unassembled(self.values, self._ahead), (self.cases,))
+        return np.broadcast_to(self.mechanism.unassembled(self.values, self._ahead) / self.ratio, (self.cases,))
 
     def broken_rule(self) -> Sentence | None:
         """The condition that the dimensions of the first case violate; None where its links are merely too short."""
@@ -232,18 +246,28 @@ class ShaftPart:
             Formula(
                 "inertia" if field == "inertia" else "resistance", expression,
                 {name: value for name, value in known.items() if name in expression.used},
-                self._stroke if "x" in expression.used else None, self._ahead, self.cycle,
+                self._stroke if "x" in expression.used else None, self._ahead, self.cycle, self.ratio,
             )
             for field, expression in own if expression is not None
         ]  # fmt: skip
 
     def motion(self, phi: Floats) -> Motion | None:
-        """The mechanism at angles of the shaft; None for one without dimensions."""
+        """The mechanism at angles of the main shaft, reduced to it; None for one without dimensions."""
+        own = self._own_motion(phi)
+        if own is None or self.ratio == 1.0:
+            return own
+        square = self.ratio * self.ratio
+        return Motion(
+            square * own.inertia, square * self.ratio * own.inertia_slope, own.way, self.ratio * own.way_slope
+        )
+
+    def _own_motion(self, phi: Floats) -> Motion | None:
+        """The mechanism at angles of the main shaft, by the angle of its own shaft; None for one without dimensions."""
         return None if self.mechanism is None else self.mechanism.motion(self.values, self.own_angle(phi))
 
     @property
     def follows_speed(self) -> bool:
-        """Whether the formula of its operation uses the speed of the shaft, ``omega``."""
+        """Whether the formula of its operation uses the speed of its shaft, ``omega``."""
         return self._operation.follows_speed
 
     @property
@@ -264,14 +288,23 @@ class ShaftPart:
     def switch(self, index: int, phi: Floats, omega: Floats) -> Floats:
         """A switch of an operation that follows the speed: a value whose sign changes where its formula has a kink.
 
-        ``phi`` are angles of the shaft, and ``omega`` the speeds there in rad/s, both of shape (cases, panels, nodes).
+        ``phi`` are angles of the main shaft, and ``omega`` its speeds there in rad/s, both of shape (cases, panels,
+        nodes).
         """
-        return self._operation.switch(index, self.own_angle(phi), omega)
+        return self._operation.switch(index, self.own_angle(phi), self.ratio * omega)
 
     def speed_law(self, phi: Floats) -> SpeedLaw:
         """The torque of an operation that follows the speed, at angles of the shaft (cases or 1, panels, nodes)."""
-        motion = self.motion(phi)
-        return self._operation.speed_law(self.own_angle(phi), None if motion is None else motion.way_slope)
+        motion = self._own_motion(phi)
+        own = self._operation.speed_law(self.own_angle(phi), None if motion is None else motion.way_slope)
+        if self.ratio == 1.0:
+            return own
+
+        def law(omega: Floats) -> tuple[Floats, Floats]:
+            torque, slope = own(self.ratio * omega)
+            return self.ratio * torque, self.ratio * self.ratio * slope
+
+        return law
 
     def fields(self, phi: Floats, omega: Floats | None = None) -> PartFields:
         """Inertia and torque at angles of the shaft, none of them at a jump.
@@ -281,19 +314,23 @@ class ShaftPart:
         phi : array, shape (cases or 1, panels, nodes)
             In rad.
         omega : array of that shape, optional
-            Speeds there in rad/s, for an operation that follows the speed; by default the part's ``pace``.
+            Speeds of the main shaft there in rad/s, for an operation that follows the speed; by default ``pace``.
         """
         own = self.own_angle(phi)
         motion = None if self.mechanism is None else self.mechanism.motion(self.values, own)
         inertia, slope = self._inertia(own, motion)
         way_slope = None if motion is None else motion.way_slope
         if omega is not None and self.follows_speed:
-            torque = self._operation.speed_law(own, way_slope)(omega)[0]
+            torque = self._operation.speed_law(own, way_slope)(self.ratio * omega)[0]
         else:
             torque = self._operation.torque(own, way_slope)
             if self._operation.loses_evenly:
                 torque = torque - self._even_loss
-        return PartFields(inertia, slope, torque + self._carried(own, motion), torque)
+        resistance = torque + self._carried(own, motion)
+        if self.ratio == 1.0:
+            return PartFields(inertia, slope, resistance, torque)
+        square = self.ratio * self.ratio
+        return PartFields(square * inertia, square * self.ratio * slope, self.ratio * resistance, self.ratio * torque)
 
     def joint_forces(
         self, phi: Floats, squares: Floats, acceleration: Floats, omega: Floats | None, factor: float | Floats
@@ -303,18 +340,20 @@ class ShaftPart:
         ``squares`` (rad^2/s^2) and ``acceleration`` (rad/s^2) are omega^2 and the acceleration of the shaft there; the
         other parameters are as in ``fields``.
         """
-        own, motion = self.own_angle(phi), self.motion(phi)
+        own, motion = self.own_angle(phi), self._own_motion(phi)
         assert motion is not None
         push = self.push(phi, motion.way_slope, omega, factor)
+        squares, acceleration = self.ratio * self.ratio * squares, self.ratio * acceleration
         rods = self._gravity if self.choice.mechanism.weights == "all" else 0.0 * self._gravity
         return joint_forces(self.values, own, squares, acceleration, push, self._gravity, rods)
 
     def push(self, phi: Floats, way_slope: Floats, omega: Floats | None, factor: float | Floats) -> Floats:
         """Force of the operation on the working part along its forward stroke in N; parameters as of ``joint_forces``.
 
-        ``way_slope`` is that of ``motion``.
+        ``way_slope`` is that of ``motion``, of which the sign counts.
         """
-        return factor * self._operation.push(self.own_angle(phi), way_slope, omega)
+        own = None if omega is None else self.ratio * omega
+        return factor * self._operation.push(self.own_angle(phi), way_slope, own)
 
     @property
     def works(self) -> bool:
@@ -331,10 +370,11 @@ class ShaftPart:
         self, phi: Floats, squares: Floats, acceleration: Floats, omega: Floats | None, factor: float | Floats
     ) -> Reactions:
         """Forces in the joints of a planar linkage; the parameters are those of ``joint_forces``."""
-        own, motion = self.own_angle(phi), self.motion(phi)
+        own, motion = self.own_angle(phi), self._own_motion(phi)
         assert motion is not None
         assert isinstance(self.mechanism, PlanarLinkage)
         push = self.push(phi, motion.way_slope, omega, factor)
+        squares, acceleration = self.ratio * self.ratio * squares, self.ratio * acceleration
         return reactions(self.mechanism, self.values, own, squares, acceleration, push, self._gravity)
 
     def _inertia(self, own: Floats, motion: Motion | None) -> tuple[Floats, Floats]:
@@ -372,7 +412,8 @@ class ShaftPart:
         if self.inertia_formula is None:
             return jumps
         ends = np.array([[[0.0, self.cycle]]])
-        exact = self._inertia(ends, None)[0] + beside + np.zeros_like(ends)  # a constant formula has one value
+        square = self.ratio * self.ratio
+        exact = square * self._inertia(ends, None)[0] + beside + np.zeros_like(ends)  # a constant formula has one value
         angles = [np.zeros((1, 1))]
         angles += [np.sort(found, axis=1)
                    for found in formula_breaks(self.inertia_formula, self._environment, self._revolutions)]  # fmt: skip
@@ -396,4 +437,5 @@ class ShaftPart:
         near = 1e-12 * self.cycle
         with np.errstate(all="ignore"):
             (below, rise), (above, fall) = self._inertia(left - near, None), self._inertia(right + near, None)
-            return (below + beside) + near * rise, (above + beside) - near * fall
+            square = self.ratio * self.ratio
+            return (square * below + beside) + square * near * rise, (square * above + beside) - square * near * fall

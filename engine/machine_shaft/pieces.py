@@ -49,9 +49,11 @@ class Formula:
     stroke : Stroke or None
         The stroke of which ``x`` is the fraction.
     ahead : array, shape (cases or 1, 1, 1), optional
-        Its ``phi`` is the shaft's angle plus this one, in rad, counted over the ``cycle``; None: they are the same.
+        Its ``phi`` is ``ratio`` times the shaft's angle plus this one, in rad, counted over the ``cycle``; None: they
+        are the same.
     cycle : float
         In rad.
+    ratio : float
     """
 
     part: Part
@@ -60,6 +62,7 @@ class Formula:
     stroke: Stroke | None = None
     ahead: Floats | None = None
     cycle: float = 2.0 * np.pi
+    ratio: float = 1.0
 
     @property
     def cases(self) -> int:
@@ -71,7 +74,9 @@ class Formula:
 
     def own_angle(self, cases: Integers, phi: Floats) -> Floats:
         """The formula's own angle at the angles ``phi`` (n, 1, m) of the shaft for the case of each row."""
-        return phi if self.ahead is None else np.asarray(np.mod(phi + _rows(self.ahead, cases), self.cycle))
+        if self.ahead is None:
+            return phi
+        return np.asarray(np.mod(self.ratio * phi + _rows(self.ahead, cases), self.cycle))
 
     def ways(self, cases: Integers, phi: Floats) -> Floats | None:
         """``x`` there; None if there is none."""
@@ -172,8 +177,11 @@ def _errors(program: Program, formula: Formula, case: Integers, low: Floats, hig
     if formula.ahead is not None:
         # A piece does not cross the end of the formula's own cycle, which is a cut.
         middle = 0.5 * (low + high)
-        shift = formula.own_angle(case, middle[:, None, None])[:, 0, 0] - middle
-        low, high = low + shift, high + shift
+        there = formula.own_angle(case, middle[:, None, None])[:, 0, 0]
+        if formula.ratio == 1.0:
+            low, high = low + (there - middle), high + (there - middle)
+        else:
+            low, high = there - formula.ratio * (middle - low), there + formula.ratio * (high - middle)
     return program.over(low, high, columns, None if ways is None else ways[:, 0, :])
 
 

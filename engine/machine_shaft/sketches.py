@@ -306,5 +306,6 @@ def sketches(spec: MachineSpec, numbers: Mapping[str, float], angles: Sequence[f
     asked = np.asarray(angles, dtype=np.float64)
     with np.errstate(invalid="ignore", divide="ignore"):
         return tuple(
-            _sketch_of(part, asked + float(numbers.get(f"{part.prefix}crank_angle", 0.0))) for part in machine.parts
+            _sketch_of(part, part.ratio * asked + float(numbers.get(f"{part.prefix}crank_angle", 0.0)))
+            for part in machine.parts
         )

@@ -118,13 +118,33 @@ class OperationChoice:
 
 @dataclass(frozen=True, slots=True)
 class PartChoice:
-    """A mechanism with its operation, one of several on a main shaft.
+    """A mechanism with its operation, one of several on a main shaft or on shafts geared to it.
 
-    Its angle is ``phi + parts.N.crank_angle``, counted over the whole cycle, for the mechanism and the operation alike.
+    Its angle is ``i*phi + parts.N.crank_angle``, counted over its own cycle, for the mechanism and the operation alike;
+    i is the speed of its shaft over that of the main shaft.
+
+    Attributes
+    ----------
+    mechanism : MechanismChoice
+    operation : OperationChoice
+    turns : int, optional
+        Revolutions of its shaft in a cycle of the machine, 1 to 60; by default those of the main shaft.
+    cycle : int, optional
+        Revolutions of its shaft after which it repeats itself, a divisor of ``turns``; by default all of them.
     """
 
     mechanism: MechanismChoice = field(default_factory=MechanismChoice)
     operation: OperationChoice = field(default_factory=OperationChoice)
+    turns: int | None = None
+    cycle: int | None = None
+
+    def turns_in(self, cycle: int) -> int:
+        """Revolutions of its shaft in a ``cycle`` of the main shaft."""
+        return cycle if self.turns is None else self.turns
+
+    def cycle_in(self, cycle: int) -> int:
+        """Revolutions of its shaft after which it repeats itself, in a ``cycle`` of the main shaft."""
+        return self.turns_in(cycle) if self.cycle is None else self.cycle
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +165,7 @@ class MachineSpec:
     mechanism, operation :
         Those of a machine without ``parts``.
     parts : tuple of PartChoice
-        Several mechanisms on the shaft, each with its operation and at its crank angle; 1 to 16, or none.
+        Several mechanisms, each with its operation, at its crank angle and on its shaft; 1 to 16, or none.
     constants : tuple of str
         Names used in its formulas besides ``phi`` (and ``x``, the fraction of the stroke); given as ``constants.NAME``.
     phi_c : int, optional

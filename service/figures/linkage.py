@@ -49,11 +49,10 @@ def machine_drawings(
 
     A mechanism is at most ``width`` px wide; one whose links do not reach has no drawing.
     """
-    angles = np.radians(np.append(np.arange(0.0, 360.0 + STEP, STEP), math.fmod(angle, 360.0)))
     symbols = {path: entry.symbol for path, entry in machine_shaft.parameters_of(structure).items()}
     several = "parts" in structure
     found = list(_train(structure, base))
-    for index, sketch in enumerate(machine_shaft.sketches_of(structure, base, angles)):
+    for index, (sketch, ratio) in enumerate(_sketches(structure, base, angle)):
         part = structure["parts"][index] if several else structure
         if not all(np.isfinite(points).all() for points in sketch.joints.values()):
             continue
@@ -65,16 +64,36 @@ def machine_drawings(
             title = f"{title} ({titled(mechanism[kind])})"
         at = f"parts.{index}." if several else ""
         title = _of_part(index + 1, title) if several else title
-        found.append(_drawing(title, sketch, f"{at}mechanism", kind, width or _WIDTH))
+        title = title if ratio == 1.0 else f"{title} (i = {ratio:.4g})"
+        found.append(_drawing(title, sketch, f"{at}mechanism", kind, width or _WIDTH, ratio))
     return tuple(drawing.labelled(symbols) for drawing in found)
+
+
+def _sketches(
+    structure: Mapping[str, Any], base: Mapping[str, float], angle: float
+) -> Iterator[tuple[machine_shaft.Sketch, float]]:
+    """Each mechanism over a turn of its shaft and then at an angle of the main shaft (degrees), and its ratio."""
+    turn, cycle = np.arange(0.0, 360.0 + STEP, STEP), structure.get("cycle", 1)
+    every = [part.get("turns", cycle) / cycle for part in structure.get("parts", ({},))]
+    drawn = {
+        ratio: machine_shaft.sketches_of(
+            structure, base, np.radians(np.append(turn / ratio, math.fmod(angle, 360.0 / ratio)))
+        )
+        for ratio in dict.fromkeys(every)
+    }
+    for index, ratio in enumerate(every):
+        yield drawn[ratio][index], ratio
 
 
 def _of_part(number: int, title: str) -> str:
     return gettext("Part {number}: {title}", number=number, title=title.lower())
 
 
-def _drawing(title: str, sketch: machine_shaft.Sketch, at: str, kind: str, largest: float) -> Drawing:
-    """The drawing of a sketch, whose last angle is that of the still, at most ``largest`` px wide."""
+def _drawing(title: str, sketch: machine_shaft.Sketch, at: str, kind: str, largest: float, ratio: float) -> Drawing:
+    """The drawing of a sketch, whose last angle is that of the still, at most ``largest`` px wide.
+
+    ``ratio`` is the speed of its shaft over that of the main shaft.
+    """
     reach = [*sketch.joints.values(), *sketch.guides]
     for plate in sketch.plates:
         size = float(np.hypot(*plate.outline.T).max())
@@ -91,7 +110,8 @@ def _drawing(title: str, sketch: machine_shaft.Sketch, at: str, kind: str, large
     turns: dict[str, Floats] = {
         name: np.asarray(np.round(-np.degrees(np.unwrap(values)), _ROUNDED)) for name, values in sketch.turns.items()
     }
-    frames = {
+    frames: dict[str, Any] = {} if ratio == 1.0 else {"ratio": ratio}
+    frames |= {
         "joints": {name: points[:-1].tolist() for name, points in joints.items()},
         "turns": {name: values[:-1].tolist() for name, values in turns.items()},
     }

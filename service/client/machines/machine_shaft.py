@@ -504,9 +504,12 @@ class ShaftOperation(TypedDict, total=False):
 
 
 class ShaftPart(TypedDict, total=False):
-    """A mechanism with its operation; their angle is that of the shaft plus the crank angle.
+    """A mechanism with its operation; their angle is that of the shaft, times the ratio, plus the crank angle.
 
     crank_angle : Angle of the part's crank at the shaft's angle 0 (alpha), rad; >= -400 rad and <= 400 rad.
+    ratio : Speed of the part's shaft over that of the main shaft (i); > 0 and <= 60.
+    cycle : Revolutions of the part's shaft after which the part repeats itself; by default all of its revolutions in a
+        cycle of the machine.
     mechanism : What the shaft drives: a table, a formula, or dimensions and masses; fields table, csv, formula,
         slider_crank, four_bar, drag_link, toggle, scotch_yoke, parallel_crank, quick_return, cam, linkage,
         interpolation.
@@ -515,6 +518,8 @@ class ShaftPart(TypedDict, total=False):
     """
 
     crank_angle: Quantity
+    ratio: Quantity
+    cycle: Any
     mechanism: ShaftMechanism
     operation: ShaftOperation
 
@@ -678,6 +683,7 @@ class Shaft(Studies):
         "operation.efficiency",
         "operation.recorded_at",
         "parts.*.crank_angle",
+        "parts.*.ratio",
         "parts.*.mechanism.slider_crank.crank",
         "parts.*.mechanism.slider_crank.rod",
         "parts.*.mechanism.slider_crank.offset",
@@ -844,8 +850,8 @@ class Shaft(Studies):
             What resists; fields value, steps, table, csv, formula, gas, indicator, quantity, over, during, sense,
             efficiency_is, interpolation, scale, efficiency, recorded_at.
         parts : values, optional
-            Several mechanisms on the shaft, each with its operation and at its crank angle; fields crank_angle,
-            mechanism, operation.
+            Several mechanisms, each with its operation, at its crank angle and on its shaft; fields crank_angle, ratio,
+            cycle, mechanism, operation.
         balance : values, optional
             What makes the work over a cycle zero; by default constant, refuse where a torque is given, motor where
             there is one.

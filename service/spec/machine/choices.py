@@ -9,6 +9,7 @@ from sprag_study.service.languages import N_
 from sprag_study.service.spec.described import FIT, Described, Listed, below
 from sprag_study.service.spec.machine.part import NO_LIMIT, Choice
 from sprag_study.service.spec.machine.shaft import SHAFT
+from sprag_study.worker.models import Parameter
 
 if TYPE_CHECKING:
     from sprag_study.worker.study import Study
@@ -40,7 +41,7 @@ def shaft_choices(study: Study, _: Mapping[str, Any]) -> Iterator[Choice]:
     """The structure of a machine shaft."""
     for path, text in _chosen(study.structure or {}):
         entry = below(SHAFT, path)
-        meaning = entry.help if isinstance(entry, Described | Listed) else PARTS[path.rpartition(".")[2]]
+        meaning = entry.help if isinstance(entry, Described | Listed | Parameter) else PARTS[path.rpartition(".")[2]]
         yield Choice(path, text, meaning)
 
 
@@ -64,8 +65,20 @@ def _chosen(structure: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         yield "drive.torque.interpolation", drive["table"]["interpolation"]
     several = structure.get("parts", ())
     for prefix, part in [(f"parts.{k}.", part) for k, part in enumerate(several)] or [("", structure)]:
-        for path, text in (*_mechanism_choices(part["mechanism"]), *_operation_choices(part["operation"])):
+        for path, text in (
+            *_shaft_choices(part, cycle),
+            *_mechanism_choices(part["mechanism"]),
+            *_operation_choices(part["operation"]),
+        ):
             yield f"{prefix}{path}", text
+
+
+def _shaft_choices(part: Mapping[str, Any], cycle: int) -> Iterator[tuple[str, str]]:
+    """The shaft of a part; none of the machine itself, whose cycle is its own."""
+    if "turns" in part:
+        yield "ratio", f"{part['turns']}/{cycle}" if part["turns"] % cycle else str(part["turns"] // cycle)
+    if "mean_speed_is" not in part and "cycle" in part:
+        yield "cycle", f"{part['cycle']} revolution{'s' if part['cycle'] > 1 else ''}"
 
 
 def _mechanism_choices(mechanism: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

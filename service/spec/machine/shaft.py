@@ -165,9 +165,10 @@ def _read_structure(base: Node, places: dict[str, str]) -> dict[str, Any] | None
     drive = read_drive(base["drive"], places)
     mechanism = read_mechanism(base["mechanism"], places)
     operation = read_operation(base["operation"], places)
-    several = [] if base["parts"].value is None else read_parts(base["parts"], places)
+    cycle = read_cycle(base["cycle"])
+    several = [] if base["parts"].value is None else read_parts(base["parts"], places, cycle)
     _refuse_both(base)
-    cycle, constants = read_cycle(base["cycle"]), read_constants(base["constants"])
+    constants = read_constants(base["constants"])
     balance, mean = read_balance(base, drive), MEAN_SPEED_IS.read(base)
     node = base["phi_c"]
     phi_c = None if node.value is None else PHI_C.read(base)

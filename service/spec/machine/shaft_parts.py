@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from fractions import Fraction
 from typing import Any, Final
 
-from sprag_study.sentences import Sentence, plural
+from sprag_study.sentences import Amount, Sentence, plural
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.catalogue import range_sentence
 from sprag_study.service.reading.units import parse_quantity
@@ -85,10 +86,21 @@ STEPS: Final = Listed(
     item=Record(numbers_under("operation.steps.K."), required=required_of(numbers_under("operation.steps.K."))),
 )  # fmt: skip
 #: The cycle and the constants of formulas.
+_REVOLUTIONS: Final = {"type": ["integer", "string"]}
 CYCLE: Final = {
-    "type": ["integer", "string"],
+    **_REVOLUTIONS,
     "default": "1 revolution",
     "description": f"revolutions of a cycle, 1 to {max(machine_shaft.REVOLUTIONS)}",
+}
+#: The shaft of a part.
+RATIO: Final = Parameter(
+    "ratio", "i", "1", 0.0, float(max(machine_shaft.REVOLUTIONS)), True, 1.0,
+    "speed of the part's shaft over that of the main shaft",
+)  # fmt: skip
+PART_CYCLE: Final = {
+    **_REVOLUTIONS,
+    "description": "revolutions of the part's shaft after which the part repeats itself; by default all of its "
+    "revolutions in a cycle of the machine",
 }
 CONSTANTS: Final = {
     "type": "object",
@@ -165,14 +177,20 @@ OPERATION: Final = Record(
     either=("value", "steps", *_RESISTANCE, "gas", "indicator"),
 )
 _PART: Final = Record(
-    {**numbers_under("parts.N."), "mechanism": MECHANISM, "operation": OPERATION},
-    "a mechanism with its operation; their angle is that of the shaft plus the crank angle",
+    {
+        **numbers_under("parts.N."),
+        RATIO.path: RATIO,
+        "cycle": PART_CYCLE,
+        "mechanism": MECHANISM,
+        "operation": OPERATION,
+    },
+    "a mechanism with its operation; their angle is that of the shaft, times the ratio, plus the crank angle",
 )
 PARTS: Final = Listed(
     "parts",
     1,
     machine_shaft.MAX_PARTS,
-    "several mechanisms on the shaft, each with its operation and at its crank angle",
+    "several mechanisms, each with its operation, at its crank angle and on its shaft",
     item=_PART,
 )
 
@@ -380,15 +398,61 @@ def _over_angle(operation: dict[str, Any], speed: float) -> dict[str, Any]:
     return operation | {"over": "angle", "table": table | {"rows": rows}}
 
 
-def read_parts(node: Node, places: dict[str, str]) -> list[dict[str, Any]] | None:
-    """Read the mechanisms of a machine of several with their operations; None, with the faults recorded, if any."""
+def _read_shaft(part: Node, cycle: int | None) -> dict[str, int]:
+    """Read the turns of a part's shaft in a ``cycle`` of the machine and the part's cycle, where they are not usual."""
+    ratio = part[RATIO.path].number_or_default(RATIO)
+    own = read_cycle(part["cycle"]) if part["cycle"].value is not None else None
+    if ratio is None or cycle is None or not part["cycle"].sound:
+        return {}
+    turns = round(ratio * cycle)
+    if not 1 <= turns <= max(machine_shaft.REVOLUTIONS) or not math.isclose(turns, ratio * cycle, rel_tol=1e-9):
+        _refuse_ratio(part[RATIO.path], ratio, cycle)
+        return {}
+    if own is not None and turns % own:
+        message = Sentence(
+            "does not divide the turns of the part in a cycle of the machine, which are {turns}", turns=str(turns)
+        )
+        divisors = (str(each) for each in machine_shaft.REVOLUTIONS if turns % each == 0)
+        part["cycle"].refuse("conflict", message, allowed=", ".join(divisors))
+        return {}
+    # What is usual is left out, so that studies from before there were such shafts keep their hash.
+    return ({} if turns == cycle else {"turns": turns}) | ({} if own in {None, turns} else {"cycle": own})
+
+
+def _refuse_ratio(node: Node, ratio: float, cycle: int) -> None:
+    """Record a ratio with which the machine would not repeat itself after its cycle."""
+    most = max(machine_shaft.REVOLUTIONS)
+    message = Sentence(
+        "lets the part turn {turns} times in a cycle of the machine ({cycle}), which must be a whole number of times, "
+        "or nothing repeats itself",
+        turns=Amount(ratio * cycle, "1", 6), cycle=plural("{count} revolution", "{count} revolutions", cycle),
+    )  # fmt: skip
+    longer = math.lcm(cycle, Fraction(ratio).limit_denominator(most).denominator)
+    near = str(min(max(round(ratio * cycle), 1), most))
+    if longer in machine_shaft.REVOLUTIONS and longer != cycle and 1 <= ratio * longer <= most:
+        allowed = Sentence(
+            "{near}/{cycle}, or a machine with a cycle of {longer} revolutions",
+            near=near, cycle=str(cycle), longer=str(longer),
+        )  # fmt: skip
+    else:
+        allowed = Sentence(
+            "1/{cycle} to {most}/{cycle}, such as {near}/{cycle}", near=near, cycle=str(cycle), most=most
+        )
+    node.refuse("conflict", message, allowed=allowed)
+
+
+def read_parts(node: Node, places: dict[str, str], cycle: int | None) -> list[dict[str, Any]] | None:
+    """Read the mechanisms of a machine of several with their operations; None, with the faults recorded, if any.
+
+    ``cycle`` are the revolutions of a cycle of the machine, if they could be read.
+    """
     parts = []
     for index, item in enumerate(PARTS.read(node) or ()):
         if _PART.read(item):
             prefix = f"parts.{index}."
             mechanism = read_mechanism(item["mechanism"], places, prefix)
             operation = read_operation(item["operation"], places, prefix)
-            parts.append({"mechanism": mechanism, "operation": operation})
+            parts.append({"mechanism": mechanism, "operation": operation} | _read_shaft(item, cycle))
     return parts if node.sound else None
 
 

@@ -25,13 +25,17 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 @dataclass
 class PartData:
-    """A mechanism with its dimensions, and an operation with its numbers, at a crank angle (rad)."""
+    """A mechanism with its dimensions, and an operation with its numbers, at a crank angle (rad).
+
+    ``ratio`` is the speed of its shaft over that of the main shaft.
+    """
 
     kind: str
     dimensions: dict[str, float]
     angle: float
     operation: str = "none"
     load: dict[str, float] = field(default_factory=dict)
+    ratio: float = 1.0
 
 
 @dataclass
@@ -131,7 +135,7 @@ def _turning(body: Body) -> Array:
 
 def inertia(part: PartData, phi: Array) -> Array:
     """Reduced inertia of a part at angles of the shaft, kg*m^2."""
-    bodies, _ = _POSITIONS[part.kind](part.dimensions, phi + part.angle + 1j * _STEP)
+    bodies, _ = _POSITIONS[part.kind](part.dimensions, part.ratio * (phi + 1j * _STEP) + part.angle)
     total = np.zeros(phi.shape)
     for body in bodies:
         mass, own, x, y = body[:4]
@@ -141,7 +145,7 @@ def inertia(part: PartData, phi: Array) -> Array:
 
 def way_slope(part: PartData, phi: Array) -> Array:
     """Travel of the working part per angle, in m/rad."""
-    bodies, way = _POSITIONS[part.kind](part.dimensions, phi + part.angle + 1j * _STEP)
+    bodies, way = _POSITIONS[part.kind](part.dimensions, part.ratio * (phi + 1j * _STEP) + part.angle)
     if part.kind == "four_bar":
         return np.asarray(-part.dimensions["rocker"] * _turning(bodies[1]))
     return np.asarray(way.imag / _STEP)
@@ -153,7 +157,7 @@ def lift(part: PartData, phi: Array) -> Array:
     The coupler of a drag link or a toggle has coordinates along the frame, everything else along the ram's line.
     """
     v, beta = part.dimensions, part.dimensions["inclination"]
-    bodies, _ = _POSITIONS[part.kind](v, phi + part.angle + 1j * _STEP)
+    bodies, _ = _POSITIONS[part.kind](v, part.ratio * (phi + 1j * _STEP) + part.angle)
     # The direction of "up" for positions that count from the ram's line, and from the frame.
     inward = part.kind not in {"toggle", "four_bar"}
     up = (-math.sin(beta) if inward else math.sin(beta)) + 1j * math.cos(beta)
@@ -169,7 +173,7 @@ def lift(part: PartData, phi: Array) -> Array:
 def _gas(part: PartData, phi: Array) -> Array:
     """Pressure on the piston of a compressor above that on its back, Pa."""
     load, stroke = part.load, _stroke(part)
-    way = _POSITIONS[part.kind](part.dimensions, phi + part.angle + 0j)[1].real
+    way = _POSITIONS[part.kind](part.dimensions, part.ratio * phi + part.angle + 0j)[1].real
     x, c, n = np.clip((way - stroke[0]) / (stroke[1] - stroke[0]), 0.0, 1.0), load["clearance"], load["exponent"]
     expanding = np.maximum(load["suction_pressure"], load["discharge_pressure"] * (c / (c + x)) ** n)
     compressing = np.minimum(load["discharge_pressure"], load["suction_pressure"] * ((1.0 + c) / (c + x)) ** n)
@@ -178,13 +182,16 @@ def _gas(part: PartData, phi: Array) -> Array:
 
 def _stroke(part: PartData) -> tuple[float, float]:
     """Least and largest travel of the working part."""
-    ends = [_POSITIONS[part.kind](part.dimensions, np.array([z + part.angle + 0j]))[1].real[0] for z in dead(part)]
+    ends = [
+        _POSITIONS[part.kind](part.dimensions, np.array([part.ratio * z + part.angle + 0j]))[1].real[0]
+        for z in dead(part)
+    ]
     return min(ends), max(ends)
 
 
 def dead(part: PartData) -> list[float]:
-    """Angles of the shaft, 0 .. 2 pi, at which the working part turns back."""
-    return _zeros(lambda phi: way_slope(part, phi), TURN)
+    """Angles of the main shaft, in the first turn of the part, at which its working part turns back."""
+    return _zeros(lambda phi: way_slope(part, phi), TURN / part.ratio)
 
 
 def _zeros(function: Callable[[Array], Array], end: float) -> list[float]:
@@ -203,8 +210,8 @@ def resistance(part: PartData, phi: Array, machine: MachineData) -> Array:
         weight = ram * machine.gravity * math.sin(part.dimensions["inclination"])
         torque -= weight * slope
     if part.operation == "step":
-        own = np.mod(phi + part.angle - load["from"], TURN * machine.cycle)
-        torque -= np.where(own < load["to"] - load["from"], load["value"], 0.0)
+        own = np.mod(part.ratio * phi + part.angle - load["from"], TURN * part.ratio * machine.cycle)
+        torque -= part.ratio * np.where(own < load["to"] - load["from"], load["value"], 0.0)
     elif part.operation == "resisting":
         torque -= load["value"] * np.abs(slope)
     elif part.operation == "gas":
@@ -214,7 +221,8 @@ def resistance(part: PartData, phi: Array, machine: MachineData) -> Array:
 
 def _cuts(machine: MachineData) -> Array:
     """Angles between which inertia and torques are smooth."""
-    end, cuts = TURN * machine.cycle, [np.linspace(0.0, TURN * machine.cycle, 72 * machine.cycle + 1)]
+    end, fastest = TURN * machine.cycle, max(1, *(math.ceil(part.ratio) for part in machine.parts))
+    cuts = [np.linspace(0.0, end, 72 * fastest * machine.cycle + 1)]
     for part in machine.parts:
         own: list[float] = []
         if part.operation in {"resisting", "gas"}:
@@ -226,10 +234,12 @@ def _cuts(machine: MachineData) -> Array:
             for x in (c * (ratio - 1.0), (1.0 + c) / ratio - c):
                 place = low + x * (high - low)
                 own += _zeros(lambda p, part=part, place=place: _POSITIONS[part.kind](
-                    part.dimensions, p + part.angle + 0j)[1].real - place, TURN)  # fmt: skip
-        cuts += [np.array([angle + TURN * k for angle in own for k in range(machine.cycle)])]
+                    part.dimensions, part.ratio * p + part.angle + 0j)[1].real - place,
+                    TURN / part.ratio)  # fmt: skip
+        turns = range(round(part.ratio * machine.cycle))
+        cuts += [np.array([angle + TURN / part.ratio * k for angle in own for k in turns])]
         if part.operation == "step":
-            cuts += [np.mod(np.array([part.load["from"], part.load["to"]]) - part.angle, end)]
+            cuts += [np.mod((np.array([part.load["from"], part.load["to"]]) - part.angle) / part.ratio, end)]
     return np.unique(np.clip(np.concatenate(cuts), 0.0, end))
 
 

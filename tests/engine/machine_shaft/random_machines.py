@@ -10,10 +10,19 @@ import numpy as np
 from tests.engine.machine_shaft.independent import TURN, MachineData, PartData, inertia, resistance
 
 
-def random_machine(rng: np.random.Generator) -> MachineData:
-    """A machine of two to five parts of any kind, with an even speed that no irregularity of its inertia stops."""
+def random_machine(rng: np.random.Generator, *, geared: bool = False) -> MachineData:
+    """A machine of two to five parts of any kind, with an even speed that no irregularity of its inertia stops.
+
+    Where it is ``geared``, each part turns one to four times in a cycle.
+    """
     cycle = int(rng.integers(1, 3))
     parts = [_random_part(rng, cycle) for _ in range(int(rng.integers(2, 6)))]
+    for part in parts if geared else ():
+        turns = int(rng.integers(1, 5))
+        part.ratio = turns / cycle
+        if part.operation == "step":
+            back = part.load["from"] - part.load["from"] % (TURN * turns - 1.5)
+            part.load |= {end: part.load[end] - back for end in ("from", "to")}
     probe = MachineData(parts, 0.0, 1.0, cycle)
     angles = np.linspace(0.0, TURN * cycle, 721)
     mechanisms = np.asarray(sum(inertia(part, angles) for part in parts))

@@ -11,7 +11,9 @@ import pytest
 
 from sprag_study.engine.endings import Ending
 from sprag_study.engine.machine_shaft.checked import check
+from sprag_study.engine.machine_shaft.load_results import joints_of, load_infos
 from sprag_study.engine.machine_shaft.problems import AssemblyError, StructureError
+from sprag_study.engine.machine_shaft.results import result_infos
 from sprag_study.engine.machine_shaft.simulate import simulate
 from sprag_study.engine.machine_shaft.spec import MachineSpec, MechanismChoice, OperationChoice, PartChoice
 from sprag_study.engine.machine_shaft.tables import Table
@@ -45,7 +47,8 @@ def engine_machine(machine: independent.MachineData) -> tuple[MachineSpec, dict[
     parts, numbers = [], {"drive.inertia": machine.inertia, "mean_speed": machine.speed}
     for k, part in enumerate(machine.parts):
         mechanism = MechanismChoice(part.kind, quick_return="whitworth")  # type: ignore[arg-type]
-        parts.append(PartChoice(mechanism, _OPERATIONS[part.operation]))
+        turns = None if part.ratio == 1.0 else round(part.ratio * machine.cycle)
+        parts.append(PartChoice(mechanism, _OPERATIONS[part.operation], turns))
         within = {"step": "operation.steps.0.", "gas": "operation.gas."}.get(part.operation, "operation.")
         own = {f"mechanism.{part.kind}.{name}": value for name, value in part.dimensions.items()}
         own |= {f"{within}{name}": value for name, value in part.load.items()}
@@ -54,10 +57,10 @@ def engine_machine(machine: independent.MachineData) -> tuple[MachineSpec, dict[
     return MachineSpec(cycle=machine.cycle, parts=tuple(parts)), numbers
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_random_machines_agree_with_an_independent_computation(seed: int) -> None:
+@pytest.mark.parametrize(("seed", "geared"), [(0, False), (1, False), (2, False), (3, False), (4, True)])
+def test_random_machines_agree_with_an_independent_computation(seed: int, geared: bool) -> None:
     """`python -m benchmarks.machine_parts` compares 300 of them."""
-    machine = random_machines.random_machine(np.random.default_rng(seed))
+    machine = random_machines.random_machine(np.random.default_rng(seed), geared=geared)
     expected = independent.solve(machine)
     found = one(*engine_machine(machine))
     for name, value in expected.items():
@@ -207,6 +210,75 @@ def test_a_structure_with_parts_survives_json() -> None:
     spec = MachineSpec(parts=(PRESS_PART, PartChoice(MechanismChoice("table", table=table))))
     assert MachineSpec.from_json(spec.to_json()) == spec
     assert "parts" not in PRESS.to_json()
+    geared = MachineSpec(cycle=2, parts=(PRESS_PART, replace(PRESS_PART, turns=6, cycle=3)))
+    assert MachineSpec.from_json(geared.to_json()) == geared
+
+
+def test_a_machine_seen_from_its_fast_shaft_is_the_same_machine() -> None:
+    """A press with a compressor at three times its speed, with the shaft of either as the main shaft.
+
+    What is reduced is converted by hand: inertias by 9, torques by 3; what parts and joints bear stays.
+    """
+    press = PartChoice(
+        MechanismChoice("slider_crank", weights="all"),
+        OperationChoice("force", "steps", over="stroke", steps=1, efficiency_is="work"),
+    )
+    gas = PartChoice(MechanismChoice("slider_crank"), OperationChoice("gas"))
+    mechanism = {path: value for path, value in PRESS_NUMBERS.items() if path.startswith("mechanism.")}
+    numbers = in_part(0, mechanism, crank_angle=0.3, **{
+        "operation.steps.0.from": 0.3, "operation.steps.0.to": 0.8, "operation.steps.0.value": 2e4,
+        "operation.efficiency": 0.8, "mechanism.slider_crank.inclination": 0.5,
+    })  # fmt: skip
+    numbers |= in_part(1, mechanism, crank_angle=1.1, **{
+        "operation.gas.piston_area": 5e-3, "operation.gas.suction_pressure": 1e5,
+        "operation.gas.discharge_pressure": 7e5, "operation.efficiency": 0.9,
+    })  # fmt: skip
+    numbers["wanted_irregularity"] = 0.05
+
+    def results(spec: MachineSpec, speed: float, inertia: float) -> dict[str, float]:
+        batch = simulate(spec, numbers | {"mean_speed": speed, "drive.inertia": inertia}, cases=1, with_loads=True)
+        infos = (*result_infos(), *load_infos(2, len(joints_of(spec))))
+        return dict(zip((info.name for info in infos), batch.values[0].tolist(), strict=True))
+
+    slow = results(MachineSpec(parts=(press, replace(gas, turns=3, cycle=1))), 10.0, 90.0)
+    whole = results(MachineSpec(parts=(press, replace(gas, turns=3))), 10.0, 90.0)
+    fast = results(MachineSpec(cycle=3, parts=(replace(press, turns=1), gas)), 30.0, 10.0)
+    units = {info.name: info.unit for info in (*result_infos(), *load_infos(2, 4))}
+    scales = {"rad": 3.0, "rad/s": 3.0, "rad/s^2": 3.0, "rad^2/s^2": 9.0, "N*m": 1.0 / 3.0, "kg*m^2": 1.0 / 9.0}
+    assert slow["irregularity"] > 0.1
+    for name, value in slow.items():
+        if math.isnan(value) or name in {"cycle.multiplier", "balance.work"}:
+            continue
+        own = not name.startswith(("parts.", "joints.")) or name.endswith("angle_at_max")
+        scale = scales.get(units[name], 1.0) if own else 1.0
+        assert whole[name] == pytest.approx(value, rel=1e-10, abs=1e-10), name
+        assert fast[name] == pytest.approx(scale * value, rel=1e-10, abs=1e-9), name
+
+
+def test_loads_and_inertias_of_a_geared_shaft_in_closed_form() -> None:
+    """Torques with the ratio, dampers and inertias with its square, diagrams at the angle and speed of the shaft."""
+    load = OperationChoice("torque", "formula", formula="m + c*omega + a*(sin(phi) + cos(phi/5))")
+    inertia = MechanismChoice("formula", formula="1 + 0.3*sin(phi)^2")
+    part = PartChoice(inertia, load, turns=5)
+    by_hand = PartChoice(
+        MechanismChoice("formula", formula="6.25*(1 + 0.3*sin(2.5*phi + 0.4)^2)"),
+        OperationChoice(
+            "torque", "formula", formula="2.5*(m + 2.5*c*omega + a*(sin(2.5*phi + 0.4) + cos(0.5*phi + 0.08)))"
+        ),
+    )
+    spec = MachineSpec(cycle=2, constants=("m", "c", "a"), parts=(part,))
+    numbers = {"mean_speed": 12.0, "drive.inertia": 4.0, "constants.m": 3.0, "constants.c": 0.5, "constants.a": 20.0}
+    found = one(spec, numbers | {"parts.0.crank_angle": 0.4})
+    expected = one(replace(spec, parts=(by_hand,)), numbers)
+    for name, value in expected.items():
+        assert found[name] == pytest.approx(value, rel=1e-9, abs=1e-9, nan_ok=True), name
+    assert found["drive_torque.mean"] == pytest.approx(2.5 * 3.0 + 6.25 * 0.5 * found["omega.mean_angle"], rel=1e-10)
+
+
+def test_turns_that_do_not_close_are_refused() -> None:
+    for turns, cycle, text in ((0, None, "1 to 60 times"), (61, None, "1 to 60 times"), (6, 4, "every 4 turns")):
+        with pytest.raises(StructureError, match=text):
+            simulate(MachineSpec(parts=(replace(PRESS_PART, turns=turns, cycle=cycle),)), {}, cases=1)
 
 
 @pytest.mark.parametrize("kind", ["slider_crank", "quick_return", "four_bar", "drag_link", "toggle"])

@@ -81,6 +81,18 @@ def test_a_flywheel_is_drawn_on_its_shaft() -> None:
     assert places == [0, 2, 4]
 
 
+def test_the_drawing_of_a_geared_part_turns_with_its_shaft() -> None:
+    study = _study("two_cylinder_compressor")
+    assert study.structure is not None
+    first, second = study.structure["parts"]
+    usual = drawings(study)[-1]
+    geared = drawings(replace(study, structure=study.structure | {"parts": [first, second | {"turns": 3}]}))[-1]
+    assert geared.title == f"{usual.title} (i = 3)"
+    frames, own = json.loads(usual.frames), json.loads(geared.frames)
+    assert (frames.get("ratio"), own["ratio"]) == (None, 3.0)
+    assert own["joints"] == frames["joints"]  # of a turn of its shaft
+
+
 def _guides(drawing: Drawing) -> list[str]:
     """The points of each guide."""
     return re.findall(r'class="dashed" points="([^"]*)"', drawing.shapes)

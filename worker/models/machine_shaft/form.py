@@ -186,7 +186,15 @@ FORM: Final = Form(
         Rows(
             "parts", "parts", 0, MAX_PARTS, "Part {number}: {label}", "Add a part", "Remove this part",
             blocks=(Block("Mechanism", (_MECHANISM,)), Block("Operation", (_OPERATION,))),
-            alone=True, fields=(FormField("crank_angle"),),
+            alone=True,
+            fields=(
+                FormField("crank_angle"),
+                FormField("ratio", label="Ratio of its shaft"),
+                FormField(
+                    "cycle", "number", "Cycle of the part", "revolutions of its shaft until the part repeats itself",
+                    default="all in a cycle of the machine", example="1 revolution",
+                ),
+            ),
         ),
     ),
     components=(

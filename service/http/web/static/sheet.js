@@ -42,8 +42,9 @@ sprag.sheet = (() => {
   // Frames of a linkage a few degrees apart, and straight lines between them.
   const linkage = (svg, degrees) => {
     svg.frames ||= JSON.parse(svg.dataset.frames);
+    const own = degrees * (svg.frames.ratio || 1); // of a shaft that is geared to the main one
     const between = (list) => {
-      const place = ((degrees % 360 + 360) % 360) / 360 * (list.length - 1), first = Math.min(Math.floor(place), list.length - 2), share = place - first;
+      const place = ((own % 360 + 360) % 360) / 360 * (list.length - 1), first = Math.min(Math.floor(place), list.length - 2), share = place - first;
       const [a, b] = [list[first], list[first + 1]];
       return Array.isArray(a) ? a.map((value, index) => value + (b[index] - value) * share) : a + (b - a) * share;
     };

@@ -44,6 +44,17 @@ def test_choices_that_a_machine_uses_survive_the_form() -> None:
     assert parse_spec(spec_of(values_of(spec))[0]).study == parse_spec(spec).study
 
 
+def test_the_shaft_of_a_part_goes_through_the_form() -> None:
+    spec = preset_of("two_cylinder_compressor")["spec"]
+    first, second = spec["base"]["parts"]
+    parts = [first, second | {"ratio": "1/2", "cycle": "1 revolution"}]
+    geared = spec | {"base": spec["base"] | {"cycle": 2, "parts": parts}}
+    study = parse_spec(geared).study
+    assert study.structure is not None
+    assert study.structure["parts"][1]["turns"] == 1
+    assert parse_spec(spec_of(values_of(geared))[0]).study == study
+
+
 def test_a_measured_motor_goes_through_the_form() -> None:
     rows = [["0 rpm", "60 N*m"], ["120 rpm", "40 N*m"], ["150 rpm", "0 N*m"]]
     drive = {"inertia": 60, "motor": {"kind": "table", "table": rows, "interpolation": "linear"}}

@@ -11,6 +11,7 @@ import pytest
 
 from sprag_study.service.faults import warned
 from sprag_study.service.spec.document import parse_spec
+from sprag_study.service.spec.machine.registry import part_of
 from sprag_study.service.spec.schema.document import spec_schema
 from tests.service.spec.machine.test_shaft import GAS, PRESS, changed, problems, study
 
@@ -87,3 +88,39 @@ def test_replaced_operations_are_warned_of_at_their_parts() -> None:
     found = parse_spec(changed(given)).warnings
     assert [warning.code for warning in found] == ["replaced-value"] * 2
     assert [str(warning).partition(":")[0] for warning in found] == [f"/base/parts/{k}/operation" for k in range(2)]
+
+
+def test_a_part_turns_with_its_shaft() -> None:
+    for cycle, ratio, own, kept in (
+        (1, 3, None, {"turns": 3}),
+        (1, "6/2", "1 revolution", {"turns": 3, "cycle": 1}),
+        (2, "1/2", None, {"turns": 1}),
+        (3, 2 / 3, 2, {"turns": 2}),
+        (2, 1, 1, {"cycle": 1}),
+        (1, 1, 1, {}),
+    ):
+        changes = of_parts(0, 90) | {"/base/cycle": cycle, "/base/parts/1/ratio": ratio}
+        changes |= {"/base/parts/1/cycle": own} if own else {}
+        jsonschema.Draft202012Validator(spec_schema()).validate(changed(changes))
+        parsed = study(changes=changes)
+        assert parsed.structure is not None
+        assert parsed.structure["parts"][1].keys() - {"mechanism", "operation"} == kept.keys()
+        assert {name: parsed.structure["parts"][1][name] for name in kept} == kept
+        chosen = {choice.path: choice.text for choice in part_of("machine-shaft").choices(parsed, changed(changes))}
+        assert chosen.get("parts.1.ratio") == {"6/2": "3", 2 / 3: "2/3", 1: None}.get(ratio, str(ratio))
+        assert chosen.get("parts.1.cycle") == (f"{kept['cycle']} revolution" if "cycle" in kept else None)
+
+
+@pytest.mark.parametrize(
+    ("changes", "pointer", "code", "allowed"),
+    [
+        ({"/base/parts/1/ratio": 0.5}, "ratio", "conflict", "1/1, or a machine with a cycle of 2 revolutions"),
+        ({"/base/parts/1/ratio": 2.71828}, "ratio", "conflict", "1/1 to 60/1, such as 3/1"),
+        ({"/base/cycle": 2, "/base/parts/1/ratio": 31}, "ratio", "conflict", "1/2 to 60/2, such as 60/2"),
+        ({"/base/parts/1/ratio": -1}, "ratio", "out-of-range", "> 0 and <= 60"),
+        ({"/base/parts/1/ratio": 6, "/base/parts/1/cycle": 4}, "cycle", "conflict", "1, 2, 3, 6"),
+    ],
+)
+def test_turns_of_a_part_that_do_not_close(changes: dict[str, Any], pointer: str, code: str, allowed: str) -> None:
+    fault = problems(of_parts(0, 90) | changes)[f"/base/parts/1/{pointer}"]
+    assert (fault.code, str(fault.allowed)) == (code, allowed)
