@@ -79,7 +79,10 @@ TOGETHER = (
             "returning script_texts site toy_in_browser walks",
         )
     ),
-    tuple(f"tests/acceptance/test_{name}.py" for name in ("bad_input", "commands", "notebook")),
+    tuple(
+        f"tests/acceptance/test_{name}.py"
+        for name in ("bad_input", "commands", "morning", "notebook", "same_rows", "traces")
+    ),
 )
 
 

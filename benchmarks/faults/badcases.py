@@ -1,7 +1,7 @@
 """Cases that crash their process, and cases that never return, among many sound ones; then they are run again.
 
-The engine's own hook (`sprag_study.engine.faults`) makes them bad; it is off in the second service, where a retry makes
-them sound.
+The engine's own hook (`sprag_study.engine.faults`) makes them bad; it is off in this process, where a retry makes them
+sound.
 """
 
 from __future__ import annotations
@@ -11,6 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.faults import harness
+from sprag_study.service.storage.part import SystemClock
+from sprag_study.service.storage.store import Store
+from sprag_study.worker.dispatcher import Dispatcher
+from sprag_study.worker.executors.inline import InlineExecutor
 
 #: Periods of all cases together that this process computes in half a minute or so.
 _WHOLE_PERIODS = 5_000_000
@@ -54,11 +58,10 @@ def badcases(
     around = [(max(0, min(case - 8, cases - 16)), min(16, cases)) for case in [*odd, *draw.sample(range(cases), 5)]]
     ranges = around if cases * periods > _WHOLE_PERIODS else ()
     harness.compare(service.database, study, made, odd, ranges)
-    with harness.running(folder, *options, **limit) as service:
-        again = service.http.post(f"/studies/{study}:retry")
-        assert again.json()["progress"]["done"] == cases - len(odd), again.text
-        ended = service.finish(study)
-        assert ended["progress"]["endings"] == {"ok": cases}
+    with Store.open(f"sqlite:///{service.database}") as store:
+        assert store.studies.retry(study).done == cases - len(odd)
+        Dispatcher(store.work, InlineExecutor(), SystemClock()).run(lambda: store.studies.get(study).over)
+        assert store.studies.progress(study).endings == {"ok": cases}
     harness.compare(service.database, study, made, ranges=ranges)
     figures: dict[str, Any] = {"cases": cases, "crashed": crashing, "timed out": hanging, "ok after a retry": cases}
     if timed:

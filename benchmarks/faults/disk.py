@@ -11,7 +11,6 @@ from typing import Any
 
 from benchmarks.faults import harness
 from sprag_study.service.jobs.preview import estimated_bytes
-from sprag_study.service.storage.store import Store
 from sprag_study.service.storage.work.room import RESERVE_BYTES
 
 _STATE = "SELECT state FROM studies WHERE id = ?"
@@ -20,8 +19,7 @@ _STATE = "SELECT state FROM studies WHERE id = ?"
 def file_limit(folder: Path, *, cases: int, studies: int, periods: float = 20.0) -> dict[str, Any]:
     """Run three or more studies under a limit of file sizes too small for all, and raise it when they are held."""
     specs = [harness.spec(cases, periods + 0.5 * number) for number in range(studies)]  # none has rows for another
-    empty = folder / "empty.sqlite3"
-    Store.open(f"sqlite:///{empty}").close()
+    empty = harness.with_tables(folder / "empty.sqlite3")
     # Half of them: enough for each alone, and so little that they are held long before the last one ends.
     room = int(0.5 * studies * estimated_bytes(harness.study_of(specs[0]))) + RESERVE_BYTES + empty.stat().st_size
     service = harness.Service(folder, "--processes", 1, SPRAG_CHUNK_CASES="250")
@@ -38,6 +36,8 @@ def file_limit(folder: Path, *, cases: int, studies: int, periods: float = 20.0)
         held: dict[str, Any] = {}
 
         def is_held() -> bool:
+            if _state(service, submitted[-1]) not in ("paused", "finished"):
+                return False
             # A held study is tried again now and then, without a reason for that while.
             held.update(service.look(submitted[-1]))
             assert held["state"] != "finished", "there was room for all studies"

@@ -36,7 +36,7 @@ from sprag_study.worker.states import StudyState
 CHUNK = 4
 #: What is drawn lies within so many events, which is about as many as ten chunks have.
 _EVENTS = 80
-_LOOK = 0.02
+_LOOK = 0.1
 _CUT_SHARE = 0.2
 #: Exit code of a process whose epoch or connection was lost.
 _GAVE_UP = 3

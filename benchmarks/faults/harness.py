@@ -10,9 +10,11 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +48,25 @@ def environment(**more: str) -> dict[str, str]:
     return {**kept, "PYTHONPATH": str(ROOT), **set_here, **more}
 
 
+@cache
+def _empty_database() -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "sprag.sqlite3"
+        Store.open(f"sqlite:///{file}").close()
+        return file.read_bytes()
+
+
+def with_tables(database: Path) -> Path:
+    """The path of a database, which is made with the tables where there is none.
+
+    A new process needs more than a second of processor time to make them, and this one makes them once.
+    """
+    if not database.exists():
+        database.touch(mode=0o600)
+        database.write_bytes(_empty_database())
+    return database
+
+
 def free_port() -> int:
     """A port that nobody listens on, below those that the system gives to connections in the meantime."""
     for port in random.SystemRandom().sample(range(20_000, 32_000), 1_000):
@@ -54,12 +75,12 @@ def free_port() -> int:
     raise AssertionError("no port is free")
 
 
-def until(condition: Callable[[], object], what: str, patience: float = PATIENCE) -> None:
-    """Wait until ``condition()`` holds."""
+def until(condition: Callable[[], object], what: str, patience: float = PATIENCE, look: float = _LOOK) -> None:
+    """Wait until ``condition()`` holds, with ``look`` seconds between two looks."""
     deadline = time.monotonic() + patience
     while not condition():
         assert time.monotonic() < deadline, f"waited {patience:g} s in vain until {what}"
-        time.sleep(_LOOK)
+        time.sleep(look)
 
 
 def kill_family(process: subprocess.Popen[bytes]) -> None:
@@ -105,6 +126,7 @@ class Service:
 
     def start(self) -> None:
         """Start it; returns when it listens."""
+        with_tables(self.database)
         command = [*COMMAND, "serve", "--json", "--port", "0", "--db", str(self.database), *self._options]
         with self.log.open("ab") as errors:
             self.process = subprocess.Popen(
@@ -138,6 +160,7 @@ class Service:
 
     def kill(self) -> None:
         """kill -9, and wait until nothing of it is left."""
+        _READER.close()
         family = psutil.Process(self.process.pid).children(recursive=True)
         self.http.close()
         self.process.kill()
@@ -149,6 +172,7 @@ class Service:
 
     def stop(self) -> float:
         """SIGTERM; seconds until everything had ended in order."""
+        _READER.close()
         self.http.close()
         family = psutil.Process(self.process.pid).children(recursive=True)
         begin = time.monotonic()
@@ -196,14 +220,40 @@ def running(folder: Path, *options: object, **environment: str) -> Iterator[Serv
     service.stop()
 
 
+class _Reader:
+    """A connection that reads a database, kept for the next question.
+
+    To open one takes 20 ms of processor time, as SQLite reads the definitions of all tables: a drill that asks ten
+    times a second would spend a fifth of a core.
+    """
+
+    def __init__(self) -> None:
+        self._file: tuple[Path, int] | None = None
+        self._connection: Any = None
+
+    def of(self, database: Path) -> Any:
+        """A connection to the file that is there now."""
+        file = (database, database.stat().st_ino)
+        if file != self._file:
+            self.close()
+            self._connection = sqlite_driver().connect(f"file:{database}?mode=ro", uri=True, timeout=PATIENCE)
+            self._file = file
+        return self._connection
+
+    def close(self) -> None:
+        """Close it, so that the last process that leaves the database tidies its log up."""
+        if self._connection is not None:
+            self._connection.close()
+        self._file = self._connection = None
+
+
+_READER = _Reader()
+
+
 def asked(database: Path, query: str, *values: object) -> Any:
-    """The first column of the first row that the database gives."""
-    connection = sqlite_driver().connect(f"file:{database}?mode=ro", uri=True, timeout=PATIENCE)
-    try:
-        row = connection.execute(query, values).fetchone()
-        return None if row is None else row[0]
-    finally:
-        connection.close()
+    """The first column of the first row that the database gives; only one thread asks."""
+    row = _READER.of(database).execute(query, values).fetchone()
+    return None if row is None else row[0]
 
 
 def locked(database: Path) -> bool:

@@ -47,13 +47,15 @@ def rounds(folder: Path, *, count: int = 50, seed: int = 1, url: str = "") -> di
     studies = 0
     with Store.open(url, chunking=Chunking(cases=8)) as store:
         undisturbed = create(store)
-        _run(url, undisturbed, 0, killed)
+        _run_here(store, undisturbed)
         while killed.total() < count:
             disturbed = create(store)
             studies += 1
-            while store.studies.get(disturbed).state is not StudyState.FINISHED:
-                # Once there were kills enough, the last study is left alone.
-                _run(url, disturbed, 0 if killed.total() >= count else draw.randint(1, _EVENTS), killed)
+            while killed.total() < count and store.studies.get(disturbed).state is not StudyState.FINISHED:
+                _run(url, disturbed, draw.randint(1, _EVENTS), killed)
+            # Once there were kills enough, the last study is left alone.
+            _run_here(store, disturbed)
+            assert store.studies.get(disturbed).state is StudyState.FINISHED
             assert whole(store, disturbed) == whole(store, undisturbed)
         record = store.studies.get(undisturbed)
     return {
@@ -82,8 +84,14 @@ def spec() -> dict[str, Any]:
     return made
 
 
+def _run_here(store: Store, study: str) -> None:
+    """Run the study to its end, if it has not come there."""
+    dispatcher = Dispatcher(store.work, InlineExecutor(), SystemClock(), owner="drill")
+    dispatcher.run(lambda: store.studies.get(study).over)
+
+
 def _run(url: str, study: str, fatal: int, killed: Counter[str]) -> None:
-    """Run the study in a process of its own that ends before event number ``fatal``; 0: it ends with the study."""
+    """Run the study in a process of its own that ends before event number ``fatal``, or with the study."""
     done = subprocess.run(
         [sys.executable, "-m", "benchmarks.faults.rounds", url, study, str(fatal)],
         cwd=ROOT, env=environment(), stdout=subprocess.PIPE, text=True, check=False,
@@ -130,13 +138,11 @@ def main(url: str, study: str, fatal: int) -> None:
     """Run every study of the database here, until the event that ends the process."""
     fate = Fate(fatal)
     with Store.open(url, chunking=Chunking(cases=8)) as store:
-        if fatal:
-            for kind, make in list(planning.PLANNERS.items()):
-                planning.PLANNERS[kind] = _watched(make, fate)
-            before_commits(fate.meet)
-            before_writes(fate.meet)
-        dispatcher = Dispatcher(store.work, InlineExecutor(), SystemClock(), owner="drill")
-        dispatcher.run(lambda: store.studies.get(study).over)
+        for kind, make in list(planning.PLANNERS.items()):
+            planning.PLANNERS[kind] = _watched(make, fate)
+        before_commits(fate.meet)
+        before_writes(fate.meet)
+        _run_here(store, study)
 
 
 if __name__ == "__main__":

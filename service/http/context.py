@@ -64,7 +64,7 @@ class Context:
     of them through `sprag_study.service.http.work`, which enforces the share of each token.
     ``streams`` are the places for event streams,
     ``stream_shares`` the share of each token of them, and ``looks`` what these look at.
-    ``ready`` is set when the checker accepts work.
+    ``ready`` is set when the checker accepts work, ``visited`` when a page is asked for.
     """
 
     settings: Settings
@@ -75,6 +75,7 @@ class Context:
     library: Library
     ending: Event = field(default_factory=Event)
     ready: Ready = field(default_factory=Ready)
+    visited: Event = field(default_factory=Event)
     streams: Semaphore = field(default_factory=lambda: Semaphore(MAX_STREAMS))
     compute_shares: Shares = field(default_factory=lambda: Shares(1, MAX_COMPUTATIONS_EACH, MAX_COMPUTATIONS))
     check_shares: Shares = field(default_factory=lambda: Shares(1, MAX_CHECKS_EACH, MAX_CHECKS))

@@ -31,6 +31,7 @@ _YEAR: Final = 365 * 24 * 3600
 
 async def page_choice(request: Request, context: Ctx) -> Choice:
     """The choice of a page: that of its address, of the browser, or of the service. Raises SelectionError."""
+    context.visited.set()
     usual, office = context.settings.units, context.settings.zone
     given, kept = request.query_params, request.cookies
     units, names = given.get("units"), given.get("names")

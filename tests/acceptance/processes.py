@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from benchmarks.faults.harness import COMMAND, ROOT, environment
+from benchmarks.faults.harness import COMMAND, ROOT, environment, with_tables
 
 __all__ = [
     "COMMAND",
@@ -80,7 +80,8 @@ class Service:
 @contextmanager
 def service(folder: Path, *options: object, **more: str) -> Iterator[Service]:
     """``sprag serve`` on a free port with a database in ``folder``; has ended, in order, when the block is left."""
-    command = [*COMMAND, "serve", "--json", "--port", "0", "--db", str(folder / "sprag.sqlite3"), *map(str, options)]
+    database = with_tables(folder / "sprag.sqlite3")
+    command = [*COMMAND, "serve", "--json", "--port", "0", "--db", str(database), *map(str, options)]
     log = folder / "service.log"
     with log.open("wb") as errors:
         process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, env=environment(**more))

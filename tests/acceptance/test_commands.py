@@ -12,10 +12,16 @@ from itertools import product
 from pathlib import Path
 
 import pytest
+from pydantic import SecretStr
 
+from benchmarks.faults.harness import with_tables
+from sprag_study.service.http.app import create_app
+from sprag_study.service.settings import Settings
 from tests.acceptance import processes
-from tests.acceptance.processes import COMMAND, EXAMPLES, INTERRUPTIBLE, SECONDS, Service, environment, service
+from tests.acceptance.processes import COMMAND, EXAMPLES, INTERRUPTIBLE, SECONDS, Service, environment
 from tests.conftest import Finished
+from tests.service.conftest import InThread
+from tests.serving import served
 
 Sprag = Callable[..., Finished]
 
@@ -116,9 +122,9 @@ def test_a_service_that_others_could_reach_needs_a_token(tmp_path: Path, sprag: 
     assert "SPRAG_TOKEN" in done.err
 
 
-def test_a_port_that_is_taken(running: Service, tmp_path: Path) -> None:
+def test_a_port_that_is_taken(running: Service, tmp_path: Path, sprag: Sprag) -> None:
     port = running.address.rpartition(":")[2]
-    done = processes.sprag("serve", "--port", port, "--db", tmp_path / "x.sqlite3")
+    done = sprag("serve", "--port", port, "--db", with_tables(tmp_path / "x.sqlite3"))
     assert done.code == 3
     assert port in done.err
 
@@ -153,15 +159,16 @@ def test_a_run_kept_in_a_database_is_found_there_by_whoever_has_the_token(
     assert sprag("admin", "db", "backup", copy, "--db", database).code == 0
     assert sprag("admin", "db", "backup", copy, "--db", database).code == 2
     assert sprag("admin", "db", "upgrade", "--db", copy, "--json").data["before"] is not None
-    (folder := tmp_path / "served").mkdir()
-    copy.rename(folder / "sprag.sqlite3")
     token = sprag("admin", "token").out.strip()
-    with service(folder, "--processes", 1, SPRAG_TOKEN=token) as running:
-        refused = sprag("list", "--server", running.address)
+    app = create_app(
+        Settings(database=str(copy), token=SecretStr(token)), computer=InThread(), checker=InThread(), writer=InThread()
+    )
+    with served(app) as address:
+        refused = sprag("list", "--server", address)
         assert refused.code == 3
         assert "token" in refused.err.lower()
         monkeypatch.setenv("SPRAG_TOKEN", token)
-        rows = sprag("export", done.data["study"], "--json", "--server", running.address)
+        rows = sprag("export", done.data["study"], "--json", "--server", address)
     assert rows.data["rows"] == done.data["rows"]
 
 
@@ -188,10 +195,11 @@ def test_a_worker_alone_runs_what_a_service_was_given(tmp_path: Path, sprag: Spr
 
 
 def test_a_reader_that_goes_away_is_no_failure_to_talk_about(tmp_path: Path) -> None:
-    short = tmp_path / "short.json"  # but with more rows than a pipe holds
-    short.write_text(json.dumps(json.loads(SPEC.read_text()) | {"run": {"duration": "12 periods"}}))
+    short = tmp_path / "short.json"  # but with more rows than a pipe holds; so few cases need no pool
+    axes = [{"path": "shaft.load", "linspace": ["0 N*m", "0.5 N*m", 120]}]
+    short.write_text(json.dumps(json.loads(SPEC.read_text()) | {"run": {"duration": "12 periods"}, "axes": axes}))
     with subprocess.Popen(
-        [*COMMAND, "run", str(short), "--processes", "1"],
+        [*COMMAND, "run", str(short)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         env=environment(),
@@ -234,7 +242,7 @@ def test_files_do_not_get_the_number_of_a_closed_stream(tmp_path: Path) -> None:
         assert (done.returncode, done.stdout) == (2, b"")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_run_leaves_nothing_behind(tmp_path: Path, number: signal.Signals) -> None:
     spec = json.loads(SPEC.read_text())
     spec["run"] = {"duration": "100000 periods"}
@@ -243,7 +251,7 @@ def test_an_interrupted_run_leaves_nothing_behind(tmp_path: Path, number: signal
     temporary = tmp_path / "tmp"
     temporary.mkdir()
     with subprocess.Popen(
-        [*INTERRUPTIBLE, "run", str(long), "--processes", "2", "-o", str(tmp_path / "rows.csv")],
+        [*INTERRUPTIBLE, "run", str(long), "--processes", "1", "-o", str(tmp_path / "rows.csv")],
         stderr=subprocess.PIPE,
         env=environment(TMPDIR=str(temporary)),
     ) as process:
@@ -259,9 +267,9 @@ def test_an_interrupted_run_leaves_nothing_behind(tmp_path: Path, number: signal
     assert sorted(path.name for path in tmp_path.iterdir()) == ["long.json", "tmp"]
 
 
-@pytest.mark.parametrize("command", ["submit", "watch"])
+@pytest.mark.parametrize(("command", "number"), [("submit", signal.SIGINT), ("watch", signal.SIGHUP)])
 def test_an_interrupt_of_a_command_that_follows_names_the_study_that_goes_on(
-    running: Service, tmp_path: Path, sprag: Sprag, command: str
+    running: Service, tmp_path: Path, sprag: Sprag, command: str, number: signal.Signals
 ) -> None:
     at = ("--server", running.address)
     spec = {**json.loads(SPEC.read_text()), "run": {"duration": "1000000 periods"}}
@@ -280,7 +288,7 @@ def test_an_interrupt_of_a_command_that_follows_names_the_study_that_goes_on(
         lines = iter(process.stderr.readline, b"")
         assert any(b"is paused" in line for line in lines)
         assert sprag("study", "resume", study, *at).code == 0
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
         said = process.stderr.read().decode()
         assert process.wait(SECONDS) == 130
     assert "interrupted" in said.splitlines()
@@ -312,8 +320,8 @@ def test_specs_and_data_come_through_standard_input(sprag: Sprag, monkeypatch: p
 
 
 def test_output_for_a_terminal_of_another_character_set() -> None:
-    assert processes.sprag("check", SPEC, PYTHONIOENCODING="ascii").code == 0
-    assert processes.sprag("--help", PYTHONIOENCODING="ascii").code == 0
+    shown = processes.sprag("--help", PYTHONIOENCODING="ascii", SPRAG_LANGUAGE="uk")
+    assert (shown.code, shown.out.decode().startswith("Використання: ")) == (0, True)
 
 
 def test_doctor_finds_the_installation_sound(tmp_path: Path, sprag: Sprag) -> None:

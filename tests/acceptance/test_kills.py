@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import httpx
@@ -17,6 +18,9 @@ from sprag_study.service.storage.store import Store
 from sprag_study.worker.dispatcher import Dispatcher
 from sprag_study.worker.executors.inline import InlineExecutor
 from tests.conftest import Finished
+
+#: Chunks of a study that a dispatcher has taken.
+CLAIMED = "SELECT count(*) FROM chunks WHERE state = 'claimed' AND study = (SELECT number FROM studies WHERE id = ?)"
 
 
 def test_killed_processes_lose_nothing(tmp_path: Path) -> None:
@@ -39,35 +43,28 @@ def test_a_dispatcher_that_was_stopped_commits_nothing_and_gives_up(tmp_path: Pa
     stopped(tmp_path, cases=200, rounds=1, seed=1)
 
 
-def test_the_service_ends_soon_with_open_streams_and_hands_running_chunks_back(tmp_path: Path) -> None:
-    made = harness.spec(4_000, 2_000.0)
-    service = harness.Service(tmp_path, "--processes", 1, SPRAG_CHUNK_CASES="500")
-    service.start()
-    study = service.submit(made)
-    claimed = "SELECT count(*) FROM chunks WHERE state = 'claimed'"
-    harness.until(lambda: harness.asked(service.database, claimed), "chunks are claimed")
-    http = httpx.Client(base_url=service.http.base_url, timeout=harness.PATIENCE, trust_env=False)
-    with http, http.stream("GET", f"/studies/{study}/events") as events:
-        lines = events.iter_lines()
-        assert any(line == "event: progress" for line in lines)
-        service.stop()
-        assert "event: end" not in list(lines)
-    assert harness.asked(service.database, claimed) == 0, service.log.read_text()
-    assert harness.asked(service.database, "SELECT count(*) FROM chunks WHERE failures > 0") == 0
-    assert harness.asked(service.database, "SELECT state FROM studies") == "running"
-
-
-def test_a_copy_made_during_a_run_goes_on_where_it_was_made(tmp_path: Path, sprag: Callable[..., Finished]) -> None:
+def test_a_copy_goes_on_where_it_was_made_and_a_service_with_open_streams_ends_soon(
+    tmp_path: Path, sprag: Callable[..., Finished]
+) -> None:
+    """One service shows both: it is copied while a study runs, and has to hand back chunks of another one."""
     made = harness.spec(120, 2_000.0)
-    with harness.running(tmp_path, "--processes", 1, SPRAG_CHUNK_CASES="10") as service:
-        study = service.submit(made)
-        harness.until(lambda: harness.done(service.database, study) > 20, "the study goes on")
-        (tmp_path / "restored").mkdir()
-        copy = tmp_path / "restored" / "sprag.sqlite3"
-        saved = sprag("admin", "db", "backup", copy, "--db", service.database)
-        assert saved.code == 0, saved.err
-        assert service.look(study)["state"] == "running"
-        service.http.post(f"/studies/{study}:cancel")
+    with ExitStack() as client:
+        with harness.running(tmp_path, "--processes", 1, SPRAG_CHUNK_CASES="10") as service:
+            study = service.submit(made)
+            harness.until(lambda: harness.done(service.database, study) > 20, "the study goes on")
+            (tmp_path / "restored").mkdir()
+            copy = tmp_path / "restored" / "sprag.sqlite3"
+            saved = sprag("admin", "db", "backup", copy, "--db", service.database)
+            assert saved.code == 0, saved.err
+            assert service.look(study)["state"] == "running"
+            service.http.post(f"/studies/{study}:cancel")
+            endless = service.submit(harness.spec(4_000, 100_000.0))
+            harness.until(lambda: harness.asked(service.database, CLAIMED, endless), "chunks are claimed")
+            lines = followed(client, service, endless)
+        assert "event: end" not in list(lines)
+    assert harness.asked(service.database, CLAIMED, endless) == 0, service.log.read_text()
+    assert harness.asked(service.database, "SELECT count(*) FROM chunks WHERE failures > 0") == 0
+    assert harness.asked(service.database, "SELECT state FROM studies WHERE id = ?", endless) == "running"
     done = harness.done(copy, study)
     assert 20 < done < 120
     assert sprag("admin", "db", "check", "--db", copy).code == 0
@@ -77,3 +74,11 @@ def test_a_copy_made_during_a_run_goes_on_where_it_was_made(tmp_path: Path, spra
         Dispatcher(store.work, executor, SystemClock()).run(lambda: store.studies.get(study).over)
     assert sum(executor.report().cases.values()) == 120 - done
     harness.compare(copy, study, made, ranges=[(16, 16), (104, 16)])
+
+
+def followed(client: ExitStack, service: harness.Service, study: str) -> Iterator[str]:
+    """The further lines of the stream of a study that shows its progress, open as long as the client."""
+    http = client.enter_context(httpx.Client(base_url=service.http.base_url, timeout=harness.PATIENCE, trust_env=False))
+    lines = client.enter_context(http.stream("GET", f"/studies/{study}/events")).iter_lines()
+    assert any(line == "event: progress" for line in lines)
+    return lines

@@ -6,6 +6,7 @@ import asyncio
 import logging
 import re
 from contextlib import suppress
+from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from fastapi import Query
@@ -53,6 +54,8 @@ _LOG: Final = logging.getLogger("sprag.service")
 _VALUES: Final = 25
 #: Seconds between two looks whether checks are possible.
 _LOOK: Final = 0.5
+#: Seconds of a service without a page before it computes the first machines all the same.
+_UNVISITED_SECONDS: Final = 60.0
 #: Width of the picture (px), unless the page says another.
 _WIDTH: Final = 560
 
@@ -190,11 +193,16 @@ def _read_ahead() -> None:
 
 
 async def warm(context: Context) -> None:
-    """Compute the machine with which the form of each model begins, so that nobody waits for the first one."""
+    """Compute the machine with which the form of each model begins, so that nobody waits for the first one.
+
+    It begins with the first page, or after `_UNVISITED_SECONDS`: beside the start of a service it would take a core
+    from the first requests, and as much processor time as the rest of the start.
+    """
+    later = monotonic() + _UNVISITED_SECONDS
     try:
-        await in_thread(_read_ahead)
-        while not context.ready.is_set():
+        while not context.ready.is_set() or not (context.visited.is_set() or monotonic() > later):
             await asyncio.sleep(_LOOK)
+        await in_thread(_read_ahead)
         for model in models.model_names():
             values = values_of(beginning(model)) | {"axes": "0"}
             drawn = await context.checker.run(drawn_machine, values)
