@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Final, cast
 
 import numpy as np
 
@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from sprag_study.worker.arrays import Floats
     from sprag_study.worker.planning.goals import Goal, GoalPlan, Limit
     from sprag_study.worker.study import Study
+
+#: 97.5 % quantile of the standard normal distribution.
+_NORMAL: Final = 1.959963984540054
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,23 +107,45 @@ def _fresh(study: Study, plan: GoalPlan, design: int, cases: range, fetch: Fetch
         cases=cases,
         drives=plan.fresh,
         goals=scores.goals[0] * signs(own),
-        results={item.name: _interval(item, table, plan.fresh) for item in plan.items if item.robust},
+        results={item.name: interval(item, table, plan.fresh) for item in plan.items if item.robust},
         feasible=bool(scores.feasible[0]),
         failed=bool(scores.failed[0]),
     )
 
 
-def _interval(item: Goal | Limit, table: Table, drives: int) -> Interval:
+def interval(item: Goal | Limit, table: Table, drives: int) -> Interval:
     """What a goal or a limit is about, with the interval of independent drives (`tolerances.quantiles`)."""
     values = table.values(item)[0]
     if item.conditions:
         share = proportion(np.rint(values * drives).astype(np.int64), np.full(values.shape, drives))
         return Interval(values, share.low, share.high)
+    if item.statistic is not None:
+        half = _half_width(item, table.drawn(item)[0])
+        return Interval(values, values - half, values + half)
     assert item.quantile is not None
     ordered, (first, last) = np.sort(table.drawn(item)[0], axis=1), ranks(drives, item.quantile)
     ends = [ordered[:, rank - 1] if 1 <= rank <= drives else np.full(len(values), math.nan) for rank in (first, last)]
     low, high = (np.where(np.isfinite(end), end, math.nan) for end in ends)
     return Interval(values, low, high)
+
+
+def _half_width(item: Goal | Limit, drawn: Floats) -> Floats:
+    """Half the width of the 95 % interval of a mean with deviations, or of a deviation, shape (points,).
+
+    For large samples m + k s is normal with the variance s^2/n (1 + k g + k^2 (b - 1)/4), the deviation s alone with
+    the last term for k = 1; g and b are skewness and kurtosis (H. Cramer, Mathematical Methods of Statistics, Princeton
+    1946, chapters 27 and 28). NaN where a drive lacks the result.
+    """
+    known = np.where(np.isfinite(drawn), drawn, math.nan)
+    apart = known - known.mean(axis=1, keepdims=True)
+    variance = (apart**2).mean(axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        skewness = np.where(variance > 0.0, (apart**3).mean(axis=1) / variance**1.5, 0.0)
+        kurtosis = np.where(variance > 0.0, (apart**4).mean(axis=1) / variance**2, 1.0)
+    k = item.deviations
+    shape = 1.0 + k * skewness + k * k * (kurtosis - 1.0) / 4.0 if item.statistic == "mean" else (kurtosis - 1.0) / 4.0
+    half: Floats = _NORMAL * np.sqrt(variance * np.maximum(shape, 0.0) / drawn.shape[1])
+    return np.where(np.isnan(known).any(axis=1), math.nan, half)
 
 
 def worst_point(item: Goal | Limit, values: Floats) -> int:

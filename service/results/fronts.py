@@ -38,7 +38,7 @@ from sprag_study.service.results.regimes import kind_columns
 from sprag_study.worker import models
 from sprag_study.worker.models import WorkerEnding
 from sprag_study.worker.planning.goals import GoalPlan, front, taken
-from sprag_study.worker.planning.goals.plan import GOAL
+from sprag_study.worker.planning.goals.plan import GOAL, statistic_text
 from sprag_study.worker.planning.goals.polish import MET
 from sprag_study.worker.planning.goals.record import serve_derivatives
 from sprag_study.worker.planning.goals.robust import Table
@@ -225,6 +225,10 @@ def infos_of(study: Study, plan: GoalPlan) -> dict[str, ResultInfo]:
         elif item.quantile is not None:
             info = known[item.result]
             text = f"{info.description}; {100.0 * item.quantile:.10g} % quantile over the drawn drives"
+            found[item.name] = replace(info, name=item.name, kind="real", description=text)
+        elif item.statistic is not None:
+            info = known[item.result]
+            text = f"{info.description}; {statistic_text(item.statistic, item.deviations)}"
             found[item.name] = replace(info, name=item.name, kind="real", description=text)
         else:
             found[item.name] = known[item.result]

@@ -25,13 +25,18 @@ if TYPE_CHECKING:
 
 SPEED = {"result": "shaft.speed.mean", "quantile": "25 %", "at_least": "6 rad/s"}
 YIELD = {"yield": [{"result": "shaft.speed.mean", "at_least": "6 rad/s"}], "at_least": "75 %"}
+MEAN = {"result": "shaft.speed.mean", "statistic": "mean", "deviations": -1, "at_least": "5 rad/s"}
 DRIVES = 8
 
 
 def robust(**fields: Any) -> dict[str, Any]:
     """A search for the best efficiency of a quarter of the drives; the amplitude, with a tolerance, sets the speed."""
     spec = spec_of(
-        best=[{"result": "efficiency", "max": True, "quantile": "25 %"}], subject_to=[SPEED, YIELD], **fields
+        **{
+            "best": [{"result": "efficiency", "max": True, "quantile": "25 %"}],
+            "subject_to": [SPEED, YIELD, MEAN],
+            **fields,
+        }
     )
     amplitudes = ["excitation.amplitude_x", "excitation.amplitude_y"]
     tolerances = [
@@ -80,7 +85,8 @@ def ended(service: Service) -> tuple[Service, str]:
 def test_the_designs_have_their_quantiles_and_yields(ended: tuple[Service, str]) -> None:
     service, study_id = ended
     found = service.get(f"/studies/{study_id}/front")
-    speed, share = (limit["result"] for limit in found["subject_to"])
+    speed, share, mean = (limit["result"] for limit in found["subject_to"])
+    assert mean == "shaft.speed.mean (mean of the drives - 1 sigma)"
     assert speed == "shaft.speed.mean (25 % quantile)"
     assert share == "yield (shaft.speed.mean at least 6)"
     assert found["best"][0]["result"] == "efficiency (25 % quantile)"
@@ -96,7 +102,9 @@ def test_the_designs_have_their_quantiles_and_yields(ended: tuple[Service, str])
         speeds = 4000.0 * columns["excitation.amplitude_x"][first + 1 : first + 1 + DRIVES]
         assert design["results"][speed] == [pytest.approx(np.sort(speeds)[1])] * 2
         assert design["results"][share] == [pytest.approx((speeds >= 6.0).mean())] * 2
-        assert design["feasible"] == bool(np.sort(speeds)[1] >= 6.0 and (speeds >= 6.0).mean() >= 0.75)
+        least = speeds.mean() - speeds.std(ddof=1)
+        assert design["results"][mean] == [pytest.approx(least)] * 2
+        assert design["feasible"] == bool(np.sort(speeds)[1] >= 6.0 and (speeds >= 6.0).mean() >= 0.75 and least >= 5.0)
     table = service.http.get(f"/api/v1/studies/{study_id}/front", params={"format": "csv"})
     assert "efficiency (25 % quantile)" in table.text
     for page in ("", "/rows", "/cases/0", "/document"):
@@ -119,7 +127,8 @@ def test_the_best_design_has_fresh_drives_and_their_intervals(ended: tuple[Servi
     assert study.spread is not None
     assert len(np.unique(study.spread.array[:, 0])) == DRIVES + FRESH
     speeds = np.sort(4000.0 * columns["excitation.amplitude_x"][:FRESH])
-    name, share = (limit["result"] for limit in report["subject_to"])
+    name, share, mean = (limit["result"] for limit in report["subject_to"])
+    assert fresh["results"][mean]["values"] == [pytest.approx(speeds.mean() - speeds.std(ddof=1))] * 2
     own = fresh["results"][name]
     assert own["values"] == [pytest.approx(speeds[7])] * 2  # number ceil(0.25 x 30) from the lowest
     # Ranks whose binomial probability is at least 95 % (scipy).
@@ -199,6 +208,18 @@ def test_designs_of_unfinished_rounds_are_pending(service: Service) -> None:
         ({"goal": {"subject_to": [{"result": "efficiency", "is": 0.2, "quantile": "5 %"}]}},
          "/goal/subject_to/0/quantile", "conflict"),
         ({"goal": {"population": 100, "generations": 60}}, "/goal/generations", "too-many"),
+        ({"goal": {"subject_to": [{**MEAN, "quantile": "5 %"}]}}, "/goal/subject_to/0/quantile", "conflict"),
+        ({"goal": {"subject_to": [{**SPEED, "deviations": 3}]}}, "/goal/subject_to/0/deviations", "not-used"),
+        ({"goal": {"subject_to": [{**MEAN, "statistic": "deviation"}]}}, "/goal/subject_to/0/deviations", "conflict"),
+        ({"goal": {"subject_to": [{**MEAN, "statistic": "median"}]}}, "/goal/subject_to/0/statistic", "invalid-choice"),
+        ({"goal": {"subject_to": [{**MEAN, "deviations": "three"}]}}, "/goal/subject_to/0/deviations", "wrong-type"),
+        ({"goal": {"subject_to": [{"yield": [MEAN], "at_least": 0.9}]}}, "/goal/subject_to/0/yield/0/statistic",
+         "unknown-field"),
+        ({"goal": {"subject_to": [{**YIELD, "statistic": "mean"}]}}, "/goal/subject_to/0/statistic", "conflict"),
+        ({"goal": {"best": [{"result": "efficiency", "statistic": "mean"}]}, "drives": 1}, "/goal/best/0/statistic",
+         "conflict"),
+        ({"tolerances": ..., "drives": ..., "goal": {"best": [{"result": "efficiency", "statistic": "mean"}]}},
+         "/goal/best/0/statistic", "conflict"),
         ({"goal": {"fresh_drives": -1}}, "/goal/fresh_drives", "out-of-range"),
         ({"goal": {"fresh_drives": 20_000, "at": [{"shaft.load": load / 100} for load in range(1, 5)]}},
          "/goal/fresh_drives", "too-many"),

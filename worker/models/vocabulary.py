@@ -17,6 +17,8 @@ _HALF_WIDTH: Final = ".half_width"
 HALF_WIDTH: Final = "{caption}, half width"
 #: What a numbered part is called, by the first words of its paths.
 _PARTS: Final = (("pendulums", "pendulum"), ("parts", "part"), ("drive.stages", "stage"), ("joints", "joint"))
+#: What of the drives a goal can be about (`sprag_study.worker.planning.goals.plan`).
+OF_DRIVES: Final = ("mean of the drives", "deviation of the drives", "{number} % quantile")
 #: What designs of a search have beside their goals and limits.
 _OF_DESIGNS: Final = ("rank", "violation", "miss")
 #: Where the short form of a description ends.
@@ -52,7 +54,7 @@ def caption(
         )
     result, beginning, about = name.partition(" (")
     if beginning and about.endswith(")"):  # what a goal is about: ``shaft.speed.mean (5 % quantile)``
-        return f"{caption(model, result, translate, single, joints)} ({about}"
+        return f"{caption(model, result, translate, single, joints)} ({_of_drives(about, translate)}"
     text, index, part = _caption(model, name)
     if part and part[1] == "0" and part[0] in single and text not in _without_part(model):
         part = None
@@ -67,6 +69,16 @@ def _called(part: tuple[str, str], translate: Callable[[str], str], joints: Sequ
     name = joints[int(part[1])]
     own, owner = _within_part(name)
     return f"{own}, {translate(owner[0])} {ordinal(owner[1])}" if owner else name
+
+
+def _of_drives(about: str, translate: Callable[[str], str]) -> str:
+    """What of the drives a goal is about, ``mean of the drives - 3 sigma``; another text as it is."""
+    for text in OF_DRIVES:
+        before, _number, after = text.partition("{number}")
+        if found := re.match(f"{re.escape(before)}(.*?){re.escape(after)}" if after else re.escape(before), about):
+            number = found[1] if after else ""
+            return translate(text).format(number=number) + about[found.end() :]
+    return about
 
 
 def bare_caption(model: str, name: str, translate: Callable[[str], str] = str) -> str:
@@ -128,7 +140,7 @@ def caption_texts(model: str) -> list[str]:
     own = (name for name in names if not name.endswith(_HALF_WIDTH))
     found = [*known.presentation.captions.values(), *(_caption(model, name)[0] for name in own)]
     axes = map(words, (DRIVE, SWEEP, *_OF_DESIGNS))  # of no machine
-    return list(dict.fromkeys([HALF_WIDTH, *(word for _, word in _PARTS), *axes, *found]))
+    return list(dict.fromkeys([HALF_WIDTH, *OF_DRIVES, *(word for _, word in _PARTS), *axes, *found]))
 
 
 def _within_part(name: str) -> tuple[str, tuple[str, str] | None]:

@@ -12,7 +12,7 @@ from sprag_study.service.reading.texts import did_you_mean
 from sprag_study.service.spec.axes.axes import PATHS, check_paths, expand, read_components
 from sprag_study.service.spec.axes.values import plan_values
 from sprag_study.service.spec.component_axes import COMPONENT, COMPONENT_AXIS
-from sprag_study.service.spec.described import Described, Listed, Record, Variants, choice
+from sprag_study.service.spec.described import Described, Field, Listed, Record, Variants, choice
 from sprag_study.service.spec.kinds.draft import Kind
 from sprag_study.service.spec.kinds.fields import (
     RESULT,
@@ -23,7 +23,15 @@ from sprag_study.service.spec.kinds.fields import (
     read_value,
 )
 from sprag_study.service.spec.kinds.places import AT, NAME, POINT_NAME, Places
-from sprag_study.service.spec.kinds.robust import FRESH, QUANTILE, check_drives, read_fresh, read_quantile
+from sprag_study.service.spec.kinds.robust import (
+    DEVIATIONS,
+    FRESH,
+    QUANTILE,
+    STATISTIC,
+    check_drives,
+    read_about_drives,
+    read_fresh,
+)
 from sprag_study.service.spec.lists import refuse_mixed
 from sprag_study.service.spec.schema.quantity import QUANTITY
 from sprag_study.service.spec.shares import in_percent
@@ -74,15 +82,17 @@ _YIELD: Final = Listed(
     "conditions", 1, 32, "the share of the drawn drives that meet all these conditions at every operating point",
     item=_LIMIT,
 )  # fmt: skip
+#: What of the drives a goal or a limit is about.
+_OF_DRIVES: Final[dict[str, Field]] = {"quantile": QUANTILE, STATISTIC.name: STATISTIC, DEVIATIONS.name: DEVIATIONS}
 _GOAL: Final = Variants((
-    Record({"result": RESULT, "max": _MAX, "quantile": QUANTILE, "at": AT, "over": _OVER}, required=("result",)),
+    Record({"result": RESULT, "max": _MAX, **_OF_DRIVES, "at": AT, "over": _OVER}, required=("result",)),
     # Generators of clients write invalid code for a constant that is true.
     Record({"yield": _YIELD, "max": {"type": "boolean", "description": "true: a yield is to be as large as possible"}},
            required=("yield",)),
 ))  # fmt: skip
 _SHARE: Final = {"type": ["number", "string"], "description": 'a share, as in "90 %"'}
 _CONSTRAINT: Final = Variants((
-    Record({**_LIMIT.fields, "quantile": QUANTILE, "over": _OVER_LIMIT}, required=("result",)),
+    Record({**_LIMIT.fields, **_OF_DRIVES, "over": _OVER_LIMIT}, required=("result",)),
     Record({"yield": _YIELD, "at_least": _SHARE}, required=("yield", "at_least")),
 ))  # fmt: skip
 GOAL: Final = Record(
@@ -351,11 +361,11 @@ def _read_best(items: Sequence[Node], places: Places) -> list[dict[str, Any]]:
             best += _read_yield_goal(item, places)
             continue
         info = read_numeric_result(item["result"])
-        largest, quantile = _MAX.read(item), read_quantile(item)
+        largest, drives = _MAX.read(item), read_about_drives(item)
         at, over = places.read(item), _read_over(item, _OVER)
-        if info is None or largest is None or quantile is None or at is None or over is None:
+        if info is None or largest is None or drives is None or at is None or over is None:
             continue
-        about = {"result": info.name, **quantile, **at, **over}
+        about = {"result": info.name, **drives, **at, **over}
         if any({key: value for key, value in goal.items() if key != "max"} == about for goal in best):
             item["result"].refuse("repeated", "is a goal already", info.name, allowed="each result once")
         else:
@@ -365,7 +375,7 @@ def _read_best(items: Sequence[Node], places: Places) -> list[dict[str, Any]]:
 
 def _read_yield_goal(item: Node, places: Places) -> list[dict[str, Any]]:
     """The goal of a large yield; nothing, and faults recorded, where it is invalid."""
-    item.refuse_each(("result", "quantile", "at", "over"), "cannot be combined with `yield`")
+    item.refuse_each(("result", *_OF_DRIVES, "at", "over"), "cannot be combined with `yield`")
     if item["max"].otherwise(True).value is not True:
         item["max"].refuse("conflict", "a yield is to be large", allowed="true")
         return []
@@ -385,20 +395,25 @@ def _read_constraint(item: Node, places: Places, *, robust: bool = False) -> dic
         return None
     if robust and "yield" in item:
         item.refuse_each(
-            ("result", "quantile", "is", "at_most", "within", "at", "over"), "cannot be combined with `yield`"
+            ("result", *_OF_DRIVES, "is", "at_most", "within", "at", "over"), "cannot be combined with `yield`"
         )
         conditions, least = _read_conditions(item["yield"], places), item["at_least"].share(0.0, 1.0)
         return None if least is None or not conditions else {"yield": conditions, "at_least": least}
-    info, kind, quantile = read_result(item["result"]), item.one_of(_KINDS), read_quantile(item)
+    info, kind, drives = read_result(item["result"]), item.one_of(_KINDS), read_about_drives(item)
     at, over = places.read(item), _read_over(item, _OVER_LIMIT) if robust else {}
-    if info is None or kind is None or quantile is None or at is None or over is None:
+    if info is None or kind is None or drives is None or at is None or over is None:
         return None
     limit = item[kind]
     if over and kind == "is":
         item["over"].refuse("conflict", "cannot be combined with `is`", allowed="at_least or at_most")
         return None
-    if quantile and kind == "is":
+    if "quantile" in drives and kind == "is":
         item["quantile"].refuse("conflict", "cannot be combined with `is`", allowed="at_least or at_most")
+        return None
+    if STATISTIC.name in drives and kind == "is" and info.kind != "real":
+        item[STATISTIC.name].refuse(
+            "conflict", "cannot be combined with `is`", allowed="a result that is a real number"
+        )
         return None
     if info.kind == "category" and kind != "is":
         limit.refuse("not-numeric", "compares a category", allowed="`is` for a category")
@@ -413,7 +428,7 @@ def _read_constraint(item: Node, places: Places, *, robust: bool = False) -> dic
     within = _read_within(item["within"], info, kind, value)
     if value is None or within is None:
         return None
-    return {"result": info.name, **quantile, **at, **over, kind: value, **({"within": within} if within else {})}
+    return {"result": info.name, **drives, **at, **over, kind: value, **({"within": within} if within else {})}
 
 
 def _read_within(node: Node, info: ResultInfo, kind: str, value: float | None) -> float | None:

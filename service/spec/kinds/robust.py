@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag_study.sentences import Sentence
-from sprag_study.service.spec.described import Described
+from sprag_study.service.spec.described import Described, choice
 from sprag_study.service.spec.node import Node
 from sprag_study.worker.limits import FRESH_DRIVES, MAX_AXIS_VALUES, MAX_FRESH_DRIVES, MAX_PLANNED_CASES
+from sprag_study.worker.planning.goals.plan import STATISTICS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from sprag_study.service.spec.report import Report
 
 #: Fields of a goal or a constraint about the drives.
-ROBUST: Final = ("quantile", "yield")
+ROBUST: Final = ("quantile", "statistic", "yield")
 #: JSON Schema of the quantile.
 QUANTILE: Final[dict[str, Any]] = {
     "type": ["number", "string"],
@@ -24,6 +25,13 @@ QUANTILE: Final[dict[str, Any]] = {
     'in "5 %"',
 }
 
+STATISTIC: Final = choice(
+    "statistic", "mean or standard deviation of the result over the drawn drives instead of that of the nominal drive",
+    *STATISTICS,
+)  # fmt: skip
+DEVIATIONS: Final = Described(
+    "deviations", "Deviations", "standard deviations that are added to the mean, such as -3", "number", -100, 100
+)
 FRESH: Final = Described(
     "fresh_drives", "Fresh drives",
     "with tolerances: drives that the search has not seen, with which its best designs are run at the end; 0: none",
@@ -65,6 +73,25 @@ def read_quantile(item: Node) -> dict[str, float] | None:
     return None if share is None else {"quantile": share}
 
 
+def read_about_drives(item: Node) -> dict[str, Any] | None:
+    """What a goal or a constraint is about beside a yield: its quantile, or its statistic, by name.
+
+    Empty where it is about the nominal drive; None, and faults recorded, where it is invalid.
+    """
+    quantile = read_quantile(item)
+    if STATISTIC.name not in item:
+        item.refuse_each((DEVIATIONS.name,), "has no effect without `statistic`", "not-used")
+        return quantile
+    item.refuse_each(("quantile",), "cannot be combined with `statistic`")
+    statistic = STATISTIC.read(item)
+    if DEVIATIONS.name in item and statistic == "deviation":
+        item[DEVIATIONS.name].refuse("conflict", "are added to a mean", allowed='with "statistic": "mean"')
+    deviations = DEVIATIONS.read(item) if DEVIATIONS.name in item else 0.0
+    if statistic is None or deviations is None:
+        return None
+    return {STATISTIC.name: statistic, **({DEVIATIONS.name: deviations} if deviations else {})}
+
+
 def check_drives(
     report: Report,
     best: Sequence[Mapping[str, Any]],
@@ -86,10 +113,13 @@ def check_drives(
     ]
     if drives and not about:
         report.fault(
-            "/tolerances", "not-used", "have no effect on this goal", allowed="goals or constraints with `quantile` or "
-            "`yield`; a study of a design afterwards shows what tolerances make of it",
+            "/tolerances", "not-used", "have no effect on this goal", allowed="goals or constraints with `quantile`, "
+            "`statistic` or `yield`; a study of a design afterwards shows what tolerances make of it",
         )  # fmt: skip
     about += [f"/goal/{FRESH.name}"] if fresh else []
+    for where in about if drives == 1 else ():
+        if where.endswith(f"/{STATISTIC.name}"):
+            report.fault(where, "conflict", "is about one drive only", allowed="`drives` of at least 2")
     for where in about if not drives else ():
         report.fault(where, "conflict", "is about the drives, of which there is one only",
                      allowed="`tolerances` in the spec")  # fmt: skip

@@ -136,9 +136,75 @@ def test_the_polish_keeps_a_quantile_within_its_limit() -> None:
     np.testing.assert_allclose(found.variables[found.feasible], 0.5, rtol=1e-5)
 
 
+def test_mean_and_deviation_are_those_of_numpy_and_missing_where_a_drive_is() -> None:
+    drives, points = 12, 2
+    values = RNG.normal(5.0, size=(4, points, drives + 1))
+    ok = np.ones(values.shape, dtype=np.bool_)
+    ok[1, 1, 3] = ok[2, 0, 0] = False
+    sums = {("mean", 0.0): (1.0, 0.0), ("deviation", 0.0): (0.0, 1.0), ("mean", -3.0): (1.0, -3.0)}
+    goals = tuple(Goal("f", True, statistic=name, deviations=k) for name, k in sums)  # type: ignore[arg-type]
+    plan = plan_of(goals, drives=drives, points=points)
+    table = Table(plan, rows_of(values, ok, drives, points))
+    drawn = np.where(ok, values, np.nan)[:, :, 1:]
+    for goal, (mean, deviation) in zip(goals, sums.values(), strict=True):
+        expected = mean * drawn.mean(axis=2) + deviation * drawn.std(axis=2, ddof=1)
+        np.testing.assert_allclose(table.values(goal), expected, rtol=1e-13)
+    assert [goal.name for goal in goals] == [
+        "f (mean of the drives)", "f (deviation of the drives)", "f (mean of the drives - 3 sigma)"
+    ]  # fmt: skip
+    # A mean of irregular motion counts with the mean of its half widths against a limit, as single ones do.
+    limit = Limit("f", "at_least", 4.0, statistic="mean", deviations=-1.0)
+    wide = rows_of(values, ok, drives, points)
+    widths = np.full(values.size, 0.25)
+    table = Table(plan, Rows(wide.points, wide.ok, {**wide.values, "f.half_width": widths}))
+    np.testing.assert_allclose(
+        table.values(limit, limit), drawn.mean(axis=2) - drawn.std(axis=2, ddof=1) - 0.25, rtol=1e-13
+    )
+
+
+def test_the_least_design_whose_mean_less_three_deviations_keeps_a_limit() -> None:
+    """The speed of a drive is x times its factor, so that x is 1 / (mean - 3 deviations of the factors) exactly."""
+    limit = Limit("speed", "at_least", 1.0, statistic="mean", deviations=-3.0)
+    plan = GoalPlan(
+        (Variable(("x",), 0.0, 4.0),), (Goal("x", max=False, statistic="mean"),), (limit,), population=8, generations=4,
+        drives=DRIVES, finish=True,
+    )  # fmt: skip
+    _, rounds = searched(plan, lambda at: {"x": at[:, 0], "speed": at[:, 0] * FACTORS[at[:, 1].astype(np.int64)]})
+    found = front(plan, joined(rounds))
+    factors = FACTORS[1:]
+    best = found.variables[found.rank == 0][0, 0]
+    assert best == pytest.approx(1.0 / (factors.mean() - 3.0 * factors.std(ddof=1)), rel=2e-6)
+
+
+def test_the_dual_response_of_a_mean_on_its_target_and_the_least_deviation() -> None:
+    """With y + n sqrt((x - 0.4)^2 + 0.01) of a noise n the deviation is least at 0.4, whatever y the mean needs."""
+    noise = np.array([0.0, *RNG.normal(size=DRIVES)])
+
+    def response(at: Floats) -> dict[str, Floats]:
+        return {"f": at[:, 1] + noise[at[:, 2].astype(np.int64)] * np.sqrt((at[:, 0] - 0.4) ** 2 + 0.01)}
+
+    goal, limit = Goal("f", max=False, statistic="deviation"), Limit("f", "is", 2.0, 0.02, statistic="mean")
+    plan = GoalPlan(
+        (Variable(("x",), 0.0, 1.0), Variable(("y",), 0.0, 4.0)), (goal,), (limit,), population=10, generations=12,
+        drives=DRIVES, finish=True,
+    )  # fmt: skip
+    assert GoalPlan.from_json(plan.to_json()) == plan
+    _, rounds = searched(plan, response)
+    found = front(plan, joined(rounds), equality=1e-6)
+    x, y = found.variables[found.rank == 0][0]
+    assert found.feasible.any()
+    assert x == pytest.approx(0.4, abs=2e-3)
+    assert y + 0.1 * noise[1:].mean() == pytest.approx(2.0, abs=1e-3)
+    assert found.goals[found.rank == 0][0, 0] == pytest.approx(0.1 * noise[1:].std(ddof=1), rel=1e-3)
+
+
 @pytest.mark.parametrize(
     ("best", "drives", "name"),
     [
+        (Goal("f", True, statistic="mean"), 1, "statistic"),
+        (Goal("f", True, statistic="mean"), 0, "best.0"),
+        (Goal("f", True, statistic="deviation", deviations=1.0), 5, "deviations"),
+        (Goal("f", True, 0.5, statistic="mean"), 5, "statistic"),
         (Goal("f", True, 0.5), 0, "best.0"),
         (Goal("f", True, 1.5), 5, "quantile"),
         (Goal("", max=True), 5, "best.0"),

@@ -25,6 +25,9 @@ Kind = Literal["is", "at_least", "at_most"]
 Over = Literal["worst", "mean", "best"]
 _OVER: tuple[Over, ...] = ("worst", "mean", "best")
 _KINDS: tuple[Kind, ...] = ("is", "at_least", "at_most")
+#: What of a result over the drawn drives a goal or a limit is about, beside a quantile: its mean or its deviation.
+Statistic = Literal["mean", "deviation"]
+STATISTICS: tuple[Statistic, ...] = ("mean", "deviation")
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +64,7 @@ class Variable:
 
 
 class _Quantity:
-    """What a goal or a limit is about: a result, a quantile of it over the drawn drives, or a yield."""
+    """What a goal or a limit is about: a result, a quantile, mean or deviation of it over the drives, or a yield."""
 
     __slots__ = ()
 
@@ -71,11 +74,13 @@ class _Quantity:
     at: tuple[int, ...]
     where: str
     over: Over | None
+    statistic: Statistic | None
+    deviations: float
 
     @property
     def robust(self) -> bool:
         """Whether it is about the drawn drives."""
-        return self.quantile is not None or bool(self.conditions)
+        return self.quantile is not None or self.statistic is not None or bool(self.conditions)
 
     @property
     def name(self) -> str:
@@ -88,8 +93,9 @@ class _Quantity:
 
     @property
     def _about(self) -> str:
-        quantile = [] if self.quantile is None else [f"{100.0 * self.quantile:.10g} % quantile"]
-        parts = [*quantile, *([self.over] if self.over else []), *([f"at {self.where}"] if self.where else [])]
+        drives = [] if self.quantile is None else [f"{100.0 * self.quantile:.10g} % quantile"]
+        drives += [] if self.statistic is None else [statistic_text(self.statistic, self.deviations)]
+        parts = [*drives, *([self.over] if self.over else []), *([f"at {self.where}"] if self.where else [])]
         return f" ({', '.join(parts)})" if parts else ""
 
 
@@ -112,6 +118,10 @@ class Goal(_Quantity):
         What these are called; "" for all.
     over : {"worst", "mean", "best"}, optional
         What counts of several points; by default as the plan says.
+    statistic : {"mean", "deviation"}, optional
+        Mean or standard deviation of the result over the drawn drives instead of a quantile.
+    deviations : float
+        How many deviations are added to the mean; 0 of a deviation.
     """
 
     result: str
@@ -121,6 +131,8 @@ class Goal(_Quantity):
     at: tuple[int, ...] = ()
     where: str = ""
     over: Over | None = None
+    statistic: Statistic | None = None
+    deviations: float = 0.0
 
     @property
     def upwards(self) -> bool:
@@ -140,7 +152,7 @@ class Limit(_Quantity):
     within : float
         Half width of the band around ``value`` of an equality; 0 for a category or a count, which must be equal.
     quantile, conditions : as of `Goal`; neither goes with "is"
-    at, where : as of `Goal`
+    at, where, statistic, deviations : as of `Goal`
     over : {"mean", "best"}, optional
         The mean or the best one of the points must meet it, instead of each; not with "is".
     """
@@ -154,6 +166,8 @@ class Limit(_Quantity):
     at: tuple[int, ...] = ()
     where: str = ""
     over: Over | None = None
+    statistic: Statistic | None = None
+    deviations: float = 0.0
 
     @property
     def upwards(self) -> bool:
@@ -364,6 +378,12 @@ class GoalPlan:
         }
 
 
+def statistic_text(statistic: Statistic, deviations: float) -> str:
+    """What a mean or a deviation is called: "mean of the drives - 3 sigma"."""
+    sign = "-" if deviations < 0.0 else "+"
+    return f"{statistic} of the drives" + (f" {sign} {abs(deviations):.6g} sigma" if deviations else "")
+
+
 def taken(item: Goal | Limit, values: NDArray[np.float64], over: Over) -> NDArray[np.float64]:
     """What counts of values at operating points, shape (designs, points) in, (designs,) out.
 
@@ -395,7 +415,19 @@ def _check_robust(plan: GoalPlan) -> None:
         quantile = one.quantile
         _check(quantile is None or 0.0 <= quantile <= 1.0, f"{name}.quantile", quantile, "0 to 1")
         _check(bool(one.result) != bool(one.conditions), name, one.result, "a result, or a yield")
-        _check(not (one.robust and isinstance(one, Limit) and one.kind == "is"), name, "is", "at_least or at_most")
+        equal = isinstance(one, Limit) and one.kind == "is"
+        _check(not (equal and one.robust and one.statistic is None), name, "is", "at_least or at_most")
+        _check_statistic(name, one, plan.drives)
+
+
+def _check_statistic(name: str, one: Goal | Limit, drives: int) -> None:
+    known = one.statistic in STATISTICS and one.quantile is None and not one.conditions
+    _check(one.statistic is None or known, f"{name}.statistic", one.statistic, "mean or deviation, of a result")
+    _check(one.statistic is None or drives > 1, f"{name}.statistic", one.statistic, "none of a single drive")
+    free = math.isfinite(one.deviations) and (one.statistic == "mean" or not one.deviations)
+    _check(free, f"{name}.deviations", one.deviations, "a finite number, of a mean")
+    polished = not isinstance(one, Limit) or one.kind != "is" or one.polished
+    _check(one.statistic is None or polished, f"{name}.within", 0.0, "a band of real numbers")
 
 
 def _check_counted(i: int, item: Goal | Limit, points: int) -> None:
@@ -416,7 +448,9 @@ def _about(one: Goal | Limit) -> dict[str, Any]:
     """What a goal or a limit is about, as plain JSON data."""
     if one.conditions:
         return {"yield": [_limit_json(condition) for condition in one.conditions]}
-    return {"result": one.result, **({} if one.quantile is None else {"quantile": one.quantile}), **_counted(one)}
+    about: dict[str, Any] = {"result": one.result, **({} if one.quantile is None else {"quantile": one.quantile})}
+    about |= {} if one.statistic is None else {"statistic": one.statistic}
+    return {**about, **({"deviations": one.deviations} if one.deviations else {}), **_counted(one)}
 
 
 def _counted(one: Goal | Limit) -> dict[str, Any]:
@@ -469,12 +503,17 @@ def _limit(i: int, data: Mapping[str, Any]) -> Limit:
     kinds = [kind for kind in _KINDS if kind in data]
     _check(len(kinds) == 1, f"subject_to.{i}", sorted(data), "one of is, at_least and at_most")
     within, (result, quantile, conditions) = float(data.get("within", 0.0)), _read_about(data)
-    return Limit(result, kinds[0], float(data[kinds[0]]), within, quantile, conditions, *_read_counted(data))
+    further = *_read_counted(data), *_read_statistic(data)
+    return Limit(result, kinds[0], float(data[kinds[0]]), within, quantile, conditions, *further)
 
 
 def _goal(data: Mapping[str, Any]) -> Goal:
     result, quantile, conditions = _read_about(data)
-    return Goal(result, bool(data["max"]), quantile, conditions, *_read_counted(data))
+    return Goal(result, bool(data["max"]), quantile, conditions, *_read_counted(data), *_read_statistic(data))
+
+
+def _read_statistic(data: Mapping[str, Any]) -> tuple[Statistic | None, float]:
+    return data.get("statistic"), float(data.get("deviations", 0.0))
 
 
 def _read_counted(data: Mapping[str, Any]) -> tuple[tuple[int, ...], str, Over | None]:

@@ -1,4 +1,5 @@
-"""What a result is worth over the drives of a design: that of the nominal drive, a quantile, or the yield.
+"""What a result is worth over the drives of a design: that of the nominal drive, a quantile, mean and deviation, or the
+yield.
 
 Drive 0 is nominal, the others are drawn; all designs have the same draws (common random numbers), so that designs are
 compared with each other and not with chance. A drive without a usable result counts as one that reaches nothing: its
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag_study.worker.models.usable import against, half_width
+from sprag_study.worker.planning.goals.linear import weighted_sum
 
 if TYPE_CHECKING:
     from sprag_study.worker.planning.goals.plan import Goal, GoalPlan, Limit
@@ -21,6 +23,18 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+
+
+def moments(values: Floats) -> tuple[Floats, Floats]:
+    """Mean and standard deviation (n - 1) of a sample along the last axis; NaN where a value is missing.
+
+    Sums are added in a fixed order, so that no processor adds them in another one.
+    """
+    count = values.shape[-1]
+    drives = np.moveaxis(values, -1, 0)
+    mean: Floats = weighted_sum(np.ones(count), drives) / count
+    squares: Floats = weighted_sum(np.ones(count), (drives - mean) ** 2)
+    return mean, np.sqrt(squares / max(count - 1, 1))
 
 
 class Table:
@@ -52,6 +66,8 @@ class Table:
         if item.conditions:
             share = np.asarray(self._held(item.conditions).sum(axis=1) / self._plan.drives)
             return np.repeat(share[:, None], self._shape[1], axis=1)
+        if item.statistic is not None:
+            return self._statistic(item, limit)
         if item.quantile is None:
             nominal: Floats = self._results(item.result, limit)[:, :, 0]
             return nominal
@@ -70,6 +86,19 @@ class Table:
         results = self._results(item.result, limit)[:, :, 1:]
         worst = -math.inf if item.upwards else math.inf
         return np.where(self.ok[:, :, 1:] & ~np.isnan(results), results, worst)
+
+    def _statistic(self, item: Goal | Limit, limit: Limit | None) -> Floats:
+        """Mean and deviation over the drawn drives, NaN where one lacks the result; with ``limit`` as of `values`."""
+        results = self._results(item.result)[:, :, 1:]
+        mean, deviation = moments(np.where(self.ok[:, :, 1:], results, np.nan))
+        if item.statistic == "deviation":
+            return deviation
+        value: Floats = mean + item.deviations * deviation
+        widths = self._rows.values.get(half_width(item.result))
+        if limit is None or widths is None:
+            return value
+        wide = np.where(np.isfinite(widths), widths, 0.0).reshape(self._shape)[:, :, 1:]
+        return against(limit.kind, limit.value, value, moments(wide)[0])
 
     def _results(self, name: str, limit: Limit | None = None) -> Floats:
         values = np.where(self._rows.ok & np.isfinite(self._rows.values[name]), self._rows.values[name], np.nan)

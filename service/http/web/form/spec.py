@@ -411,6 +411,8 @@ _TOWARD: Final = Cell(
     lambda item: {"toward": "max" if item.get("max", False) else "min"}, counts=False,
 )  # fmt: skip
 _LIMIT: Final = Cell((*(kind for kind, _label in LIMITS), "within"), (*["value"] * 3, "within"), _limit, _limit_fields)
+#: What of the drives a goal or a limit is about.
+_OF_DRIVES: Final = (chosen("statistic"), typed("deviations"), typed("quantile"))
 _COUNTED: Final = (
     Cell(("at",), ("at",), lambda form: {"at": text} if (text := form.text("at")) else {}, _counted, counts=False),
     chosen("over"),
@@ -452,12 +454,13 @@ PARTS: Final = {
             _Varied(Record((_PATHS, _VARIABLE_VALUES), whole="/values")),
         ),
         Rows(
-            "best", "/goal/best", GOAL.listed["best"].high, Record((_RESULT, _TOWARD, *_COUNTED), whole="/result"),
+            "best", "/goal/best", GOAL.listed["best"].high,
+            Record((_RESULT, _TOWARD, *_OF_DRIVES, *_COUNTED), whole="/result"),
             new={"toward": "max"}, always=False,
         ),
         Rows(
             "subject_to", "/goal/subject_to", GOAL.listed["subject_to"].high,
-            Record((_RESULT, _LIMIT, *_COUNTED), whole="/result"), new={"kind": "at_most"}, always=False,
+            Record((_RESULT, _LIMIT, *_OF_DRIVES, *_COUNTED), whole="/result"), new={"kind": "at_most"}, always=False,
         ),
         _AT,
         _ASKED,

@@ -56,6 +56,20 @@ def test_a_search_is_cloned_with_all_that_it_asks_for() -> None:
         assert faults == {}
         assert again["goal"] == spec["goal"]
         assert parse_spec(again).study.plan == parse_spec(spec).study.plan
+    drives = {"tolerances": [{"path": "shaft.load", "plus_minus": "5 %"}], "drives": 8}
+    robust = {
+        "best": [{"result": "efficiency", "max": True, "statistic": "mean"}],
+        "subject_to": [
+            {"result": "shaft.speed.mean", "statistic": "mean", "deviations": -3, "at_least": "6 rad/s"},
+            {"result": "torque.max", "quantile": "95 %", "at_most": "3 N*m"},
+            {"result": "torque.max", "statistic": "deviation", "at_most": "0.1 N*m"},
+        ],
+        "fresh_drives": 50,
+    }
+    spec = searching(**robust, at=[]) | drives
+    again, faults = spec_of(values_of(json.loads(json.dumps(spec))))
+    assert faults == {}
+    assert parse_spec(again).study.plan == parse_spec(spec).study.plan
     named = [{"name": "idle", "shaft.load": "0.1 N*m"}, {"shaft.load": "0.3 N*m"}]
     best, limit = {"result": "efficiency", "max": True, "over": "best"}, {"result": "torque.max", "at_most": "3 N*m"}
     spec = searching(at=named, best=[best], subject_to=[{**limit, "at": "idle"}, {**limit, "over": "mean"}])
