@@ -26,8 +26,13 @@ from tests.conftest import ROOT
 IGNORED = tuple(
     line for line in (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines() if line and line[0] != "#"
 )
-#: Compiled kernels of the tests serve the containers, too: their sources are the same.
-KERNELS = {"SPRAG_KERNEL_CACHE": os.environ.get("SPRAG_KERNEL_CACHE", str(Path.home() / ".cache" / "sprag"))}
+#: Compiled kernels of the tests serve the containers, too: their sources are the same. One process of each kind
+#: suffices, and those of this machine's number of cores would each load the engine.
+SPARING = {
+    "SPRAG_KERNEL_CACHE": os.environ.get("SPRAG_KERNEL_CACHE", str(Path.home() / ".cache" / "sprag")),
+    "SPRAG_PROCESSES": "1",
+    "SPRAG_CHECK_PROCESSES": "1",
+}
 #: Top folders of the containers that lie below the root of a test.
 _OWN = re.compile(r"(?<![\w.:/-])(?=/(?:opt|build|var)/?)")
 
@@ -129,6 +134,7 @@ class Image:
             "PIP_NO_INDEX": "1",
             "PIP_NO_BUILD_ISOLATION": "0",  # pip reads it the other way round
             "PIP_DISABLE_PIP_VERSION_CHECK": "1",
+            "PIP_COMPILE": "0",  # modules are compiled as they are imported, which are half of them
             "PYTHONWARNINGS": "ignore",
         }
         for name, value in {**self.environment, **more}.items():

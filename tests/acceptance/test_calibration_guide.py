@@ -23,7 +23,8 @@ def test_the_example_of_the_guide_has_its_values() -> None:
     spec = json.loads((ROOT / "examples" / "one_pendulum.json").read_text(encoding="utf-8"))
     spec = {name: value for name, value in spec.items() if name not in {"axes", "combine", "run"}}
     parsed = parse_spec({**spec, **json.loads(f"{{{fields}}}")})
-    with run_here(parsed.spec, parsed.study, processes=0) as done:
+    # Each round is one chunk: cases that run side by side take hardly more time than a few of them.
+    with run_here(parsed.spec, parsed.study, processes=0, chunk_cases=64) as done:
         study_id, store = done.record.id, done.store
         rows = partial(store.rows.for_cases, study_id)
         found = calibration_json(

@@ -16,7 +16,7 @@ import pytest
 
 from benchmarks.faults.harness import COMMAND, kill_family, until
 from sprag_study.service.storage.store import Store
-from tests.acceptance.containers import KERNELS
+from tests.acceptance.containers import SPARING
 from tests.acceptance.unit import settings
 from tests.conftest import ROOT
 from tests.service.timed_spec import SPEC
@@ -58,7 +58,7 @@ def environment(root: Path, **more: str) -> dict[str, str]:
         for letter, folder in _FOLDERS.items():
             value = value.replace(letter, folder)
         found[name] = value.replace("/var/", f"{root}/var/")
-    return {**found, **KERNELS, "SPRAG_PROCESSES": "1", "SPRAG_CHECK_PROCESSES": "1", **more}
+    return {**found, **SPARING, **more}
 
 
 def under(unit: Path, *command: str) -> list[str]:
@@ -118,7 +118,7 @@ def test_a_study_runs_to_its_end(served: httpx.Client) -> None:
         states.append(served.get(f"/api/v1/studies/{study}").json()["state"])
         return states[-1] == "finished" or "has ended 3 times" in served.get("/readyz").text
 
-    until(over, "the study has ended, or its worker again and again")
+    until(over, "the study has ended, or its worker again and again", look=1.0)
     assert states[-1] == "finished"
     assert served.get("/readyz").json()["status"] == "ok"
     rows = served.get(f"/api/v1/studies/{study}/results", params={"format": "csv"}).text.splitlines()

@@ -18,7 +18,7 @@ import pytest
 
 from benchmarks.faults.harness import free_port, kill_family, until
 from tests import postgres
-from tests.acceptance.containers import KERNELS, Image, compose, interpolated, is_sent, started_before, steps
+from tests.acceptance.containers import SPARING, Image, compose, interpolated, is_sent, started_before, steps
 from tests.conftest import ROOT
 from tests.service.timed_spec import SPEC
 from tests.worker.executors.certificates import require_openssl
@@ -51,13 +51,15 @@ def going(process: subprocess.Popen[bytes], log: Path) -> Iterator[subprocess.Po
 def answers(address: str) -> None:
     """Wait until a service is ready for studies."""
 
-    def ready() -> bool:
-        try:
-            return httpx.get(f"{address}/readyz", trust_env=False, timeout=600).status_code == 200
-        except httpx.TransportError:
-            return False
+    with httpx.Client(base_url=address, trust_env=False, timeout=600) as client:
 
-    until(ready, "the service answers")
+        def ready() -> bool:
+            try:
+                return client.get("/readyz").status_code == 200
+            except httpx.TransportError:
+                return False
+
+        until(ready, "the service answers", look=1.0)
 
 
 def test_the_image_has_the_program_and_nothing_of_its_sources(image: Image) -> None:
@@ -99,34 +101,24 @@ def test_its_processes_run_as_a_user_who_owns_the_volume_only(image: Image) -> N
 
 
 def test_the_command_serves_with_a_token_only(image: Image, tmp_path: Path) -> None:
-    log, port = tmp_path / "log", free_port()
+    log = tmp_path / "log"
     assert (image.environment["SPRAG_HOST"], image.environment["SPRAG_PORT"]) == ("0.0.0.0", "8000")
-    variables = {**KERNELS, "SPRAG_PORT": str(port), "SPRAG_PROCESSES": "1"}
-    with going(image.start(image.command, log, **variables), log) as refused:
+    with going(image.start(image.command, log, **SPARING, SPRAG_PORT=str(free_port())), log) as refused:
         assert refused.wait(600) == 2, log.read_text()
     assert "needs a token" in log.read_text()
-    with going(image.start(image.command, log, **variables, SPRAG_TOKEN=TOKEN), log) as process:
-        address = f"http://127.0.0.1:{port}"
-        answers(address)
-        image.run(image.health, **variables)
-        assert httpx.get(f"{address}/api/v1/studies", trust_env=False).status_code == 401
-        process.send_signal(signal.Signals[image.declared["STOPSIGNAL"]])
-        assert process.wait(600) == 0, log.read_text()
-    assert image.path("sprag.sqlite3").exists()
-    assert "Traceback" not in log.read_text()
 
 
 def test_the_health_check_asks_where_the_service_listens(
     image: Image, certificate: tuple[Path, Path], tmp_path: Path
 ) -> None:
     """By TLS, at the port, host and prefix of a file; it fails where nobody answers."""
-    file = tmp_path / "settings.toml"
+    file, port = tmp_path / "settings.toml", free_port()
     file.write_text(
-        f'port = {free_port()}\nhost = "::"\nurl_prefix = "/sprag"\n'
+        f'port = {port}\nhost = "::"\nurl_prefix = "/sprag"\n'
         f'tls_certificate = "{certificate[0]}"\ntls_key = "{certificate[1]}"\n'
     )
     # The image sets host and port; in the environment nothing means the file.
-    variables = {**KERNELS, "SPRAG_SETTINGS": str(file), "SPRAG_HOST": "", "SPRAG_PORT": "", "SPRAG_PROCESSES": "1"}
+    variables = {**SPARING, "SPRAG_SETTINGS": str(file), "SPRAG_HOST": "", "SPRAG_PORT": ""}
     log = tmp_path / "log"
     with going(image.start(image.command, log, **variables, SPRAG_TOKEN=TOKEN), log) as process:
         until(
@@ -134,8 +126,12 @@ def test_the_health_check_asks_where_the_service_listens(
         )
         assert re.search(r"Sprag serves at https://\S+:\d+/sprag\b", log.read_text())
         image.run(image.health, **variables)
-        process.send_signal(signal.SIGTERM)
+        studies = httpx.get(f"https://[::1]:{port}/sprag/api/v1/studies", trust_env=False, verify=False)
+        assert studies.status_code == 401
+        process.send_signal(signal.Signals[image.declared["STOPSIGNAL"]])
         assert process.wait(600) == 0, log.read_text()
+    assert image.path("sprag.sqlite3").exists()
+    assert "Traceback" not in log.read_text()
     with pytest.raises(AssertionError):
         image.run(image.health, **variables)
 
@@ -225,7 +221,7 @@ class Composed:
 
     def variables(self, name: str, **more: str) -> dict[str, str]:
         own = {key: self.here(value) for key, value in self.services[name]["environment"].items()}
-        return {**KERNELS, **own, **self.more, **more}
+        return {**SPARING, **own, **self.more, **more}
 
     def run(self, name: str) -> str:
         return self.image.run(self.command(name), **self.variables(name))
@@ -246,7 +242,9 @@ def runs_a_study(address: str) -> None:
     answers(address)
     with httpx.Client(base_url=f"{address}/api/v1", headers=BEARER, trust_env=False, timeout=600) as client:
         study = client.post("/studies", json=SPEC).json()["id"]
-        until(lambda: client.get(f"/studies/{study}").json()["state"] == "finished", "the study has ended")
+        with client.stream("GET", f"/studies/{study}/events") as events:
+            assert "event: end" in events.iter_lines()
+        assert client.get(f"/studies/{study}").json()["state"] == "finished"
         (dispatcher,) = client.get("/workers").json()["dispatchers"]
         assert (dispatcher["executor"], dispatcher["refused"]) == ("dask", [])
         assert dispatcher["scheduler"].startswith("tls://")
@@ -289,6 +287,7 @@ def test_the_commands_of_the_compose_file_run_one_by_one(image: Image, tmp_path:
                         started[name] = image.start(composed.command(name), log, **variables)
             assert set(started) == {"scheduler", "worker", "service"}
             runs_a_study(f"http://127.0.0.1:{port}")
+            image.run(image.health, **composed.variables("service", SPRAG_PORT=str(port)))
             started["service"].send_signal(signal.SIGTERM)
             assert started["service"].wait(600) == 0
         except BaseException:

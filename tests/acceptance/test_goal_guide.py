@@ -41,7 +41,7 @@ def test_the_examples_of_the_guide_have_their_designs(section: str) -> None:
     parsed = parse_spec({**spec, **json.loads(f"{{{fields}}}")})
     if section == "What it answers":
         assert parsed.study == parse_spec(spec).study
-    with run_here(parsed.spec, parsed.study, processes=0) as done:
+    with run_here(parsed.spec, parsed.study, processes=0, chunk_cases=64) as done:
         study, rounds = done.store.studies.study(done.record.id), done.store.studies.rounds(done.record.id)
         found = designs_of(study, rounds, partial(done.store.rows.for_cases, done.record.id))
         progress = done.store.studies.progress(done.record.id).rounds

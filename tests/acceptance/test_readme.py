@@ -75,7 +75,11 @@ def demonstration(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Demonstr
     folder = tmp_path_factory.mktemp("demonstration")
     with (folder / "shown").open("wb") as output, (folder / "said").open("wb") as errors:
         process = subprocess.Popen(
-            [*INTERRUPTIBLE, "demo"], cwd=folder, stdout=output, stderr=errors, env=environment()
+            [*INTERRUPTIBLE, "demo"],
+            cwd=folder,
+            stdout=output,
+            stderr=errors,
+            env=environment(SPRAG_PROCESSES="1"),
         )
     yield Demonstration(folder, process)
     kill_family(process)
@@ -92,7 +96,7 @@ def test_every_command_of_the_two_pages_does_what_it_says(tmp_path: Path, demons
     done = subprocess.run(
         ["/bin/sh", "-eu", "-c", script.replace(PRINTED, demonstration.address)],
         cwd=tmp_path,
-        env=environment(PATH=path, no_proxy="127.0.0.1"),
+        env=environment(PATH=path, no_proxy="127.0.0.1", SPRAG_PROCESSES="1"),
         capture_output=True,
         timeout=SECONDS,
         check=False,

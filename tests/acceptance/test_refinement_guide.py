@@ -36,7 +36,7 @@ def test_the_example_of_the_guide_has_its_numbers() -> None:
     assert parsed.study.plan is not None
     planner = planner_of(parsed.study.plan)
     assert f"at most {planner.most_cases} cases in at most {planner.most_rounds} rounds" in page
-    with run_here(parsed.spec, parsed.study, processes=0) as done:
+    with run_here(parsed.spec, parsed.study, processes=0, chunk_cases=64) as done:
         study = done.store.studies.study(done.record.id)
         query = main_query(study)
         assert query is not None

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
+import runpy
 import shlex
 import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from benchmarks.faults.harness import until
-from tests.acceptance.processes import SECONDS, environment, service
+from tests.acceptance.processes import SECONDS, service
 from tests.conftest import ROOT
 
 if TYPE_CHECKING:
@@ -70,7 +70,9 @@ def test_every_task_has_its_number() -> None:
     assert re.findall(r"^\*\*(\d+)\. ", PAGE, re.MULTILINE) == [str(number) for number in range(1, 34)]
 
 
-def test_studies_run_here(folder: Path, sprag: Callable[..., Finished], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_studies_run_here(
+    folder: Path, sprag: Callable[..., Finished], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     for line in lines(HERE):
         typed(line, sprag, monkeypatch)
     assert (folder / "commas.csv").read_bytes().startswith(b"\xef\xbb\xbfcase;")
@@ -78,16 +80,14 @@ def test_studies_run_here(folder: Path, sprag: Callable[..., Finished], monkeypa
         assert (folder / name).stat().st_size > 1000
     (script,) = re.findall(r"^```python\n(.*?)^```$", HERE, re.DOTALL | re.MULTILINE)
     (folder / "script.py").write_text(script)
-    done = subprocess.run(
-        [sys.executable, "script.py"], env=environment(), timeout=SECONDS, check=True, capture_output=True, text=True
-    )
-    assert "shaft.speed.mean" in done.stdout
+    runpy.run_path("script.py", run_name="__main__")
+    assert "shaft.speed.mean" in capsys.readouterr().out
 
 
 def test_a_service_and_its_administration(
     folder: Path, sprag: Callable[..., Finished], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with service(folder) as running:
+    with service(folder, "--processes", 1) as running:
         monkeypatch.setenv("SPRAG_SERVER", running.address)
         for line in (*lines(SERVICE), *lines(ADMINISTRATION)):
             typed(line, sprag, monkeypatch)
