@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from sprag_study.worker import models
+from sprag_study.worker.chunking import Chunking
 from sprag_study.worker.models import ChunkResult
 from sprag_study.worker.rounds import Rounds
 from sprag_study.worker.study import Study
@@ -60,11 +61,13 @@ def search(service: Service, rounds: int = 99, **fields: Any) -> str:
 
 def search_of(service: Service, spec: dict[str, Any], rounds: int = 99) -> str:
     """The same of a whole spec."""
-    study_id = service.submit(spec)
     store = service.store
+    usual, store.dispatchers.base_chunking = store.dispatchers.base_chunking, Chunking(100_000, 1, 60.0)
+    study_id = service.submit(spec)
     number, epoch, planner = store.studies.get(study_id).number, store.work.take_over("test"), Rounds(store.work)
     for _ in range(rounds):
-        run_round(store, number, epoch, rows_of)
+        run_round(store, number, epoch, rows_of)  # one transaction a round
         if planner.advance(epoch, number, store.studies.study(study_id)) is None:
             break
+    store.dispatchers.base_chunking = usual
     return study_id

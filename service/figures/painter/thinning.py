@@ -32,11 +32,13 @@ def thin(y: NDArray[np.float64], most: int) -> NDArray[np.int64]:
     edges = np.linspace(0, y.size, buckets + 1).astype(np.int64)
     kept: list[int] = []
     missing = np.isnan(y)
+    holed = bool(missing.any())
+    lowest, highest = (np.nanargmin, np.nanargmax) if holed else (np.argmin, np.argmax)
     for start, stop in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
         kept += [start, stop - 1]
         gaps = missing[start:stop]
-        if gaps.any():
+        if holed and gaps.any():
             kept.append(start + int(np.argmax(gaps)))
-        if not gaps.all():
-            kept += [start + int(np.nanargmin(y[start:stop])), start + int(np.nanargmax(y[start:stop]))]
+        if not holed or not gaps.all():
+            kept += [start + int(lowest(y[start:stop])), start + int(highest(y[start:stop]))]
     return np.unique(np.array(kept, dtype=np.int64))

@@ -11,6 +11,7 @@ import time
 from base64 import urlsafe_b64encode
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 from urllib.parse import parse_qs, urlencode, urlsplit
@@ -23,6 +24,12 @@ from sprag_study.service.http.oidc import LOGIN_COOKIE
 
 CLIENT = "sprag"
 RETURN = "/login/oidc/return"
+
+
+@cache
+def _known_key() -> RSAKey:
+    """A key of a size that is accepted, which takes a quarter of a second to be found."""
+    return RSAKey.generate_key(2048, {"kid": "k1"})
 
 
 class Openid:
@@ -44,7 +51,7 @@ class Openid:
         self.issuer = f"http://{host}:{port}"
         self.people: dict[str, list[str]] = {}
         self._nonce = ""
-        self.known = RSAKey.generate_key(2048, {"kid": "k1"})
+        self.known = _known_key()
         self.key: RSAKey | OctKey | None = self.known
         self.header: dict[str, str] = {"alg": "RS256", "kid": "k1"}
         self.about: dict[str, Any] = {}

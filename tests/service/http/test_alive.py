@@ -31,7 +31,8 @@ def test_the_address_is_that_of_the_settings(host: str, expected: str, certifica
 
 
 def test_a_service_is_alive_until_it_ends(tmp_path: Path) -> None:
-    with service(tmp_path, SPRAG_PROCESSES="1", SPRAG_ALLOWED_HOSTS="sprag.example") as started:
+    fewest = {"SPRAG_PROCESSES": "1", "SPRAG_CHECK_PROCESSES": "1"}
+    with service(tmp_path, SPRAG_ALLOWED_HOSTS="sprag.example", **fewest) as started:
         settings = Settings(port=int(started.address.rpartition(":")[2]))
         assert is_alive(settings)
         assert not is_alive(settings.model_copy(update={"tls_certificate": "server.pem"}))

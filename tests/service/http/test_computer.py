@@ -13,7 +13,7 @@ from contextlib import aclosing
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import psutil
 import pytest
@@ -30,11 +30,14 @@ if TYPE_CHECKING:
 
     from sprag_study.service.faults import Kind
 
+#: What a process does first, of a module that it has anyway: others take it half a second to be imported.
+NOTHING: Final = gc.enable
+
 
 @pytest.fixture
 def computer() -> Iterator[ProcessComputer]:
     """A computer with short timeouts."""
-    made = ProcessComputer(Limits(0.5, COMPUTATION_BYTES))
+    made = ProcessComputer(Limits(0.5, COMPUTATION_BYTES), prepare=NOTHING)
     yield made
     made.close()
 
@@ -55,7 +58,7 @@ def test_it_computes_elsewhere_and_survives_crashes(computer: ProcessComputer, p
 
 def test_what_is_killed_is_run_once_more(tmp_path: Path, portal: BlockingPortal) -> None:
     """A process may be killed for no fault of what it computes."""
-    computer = ProcessComputer(Limits(60.0, COMPUTATION_BYTES, died="unavailable"), prepare=fakes.prepare_nothing)
+    computer = ProcessComputer(Limits(60.0, COMPUTATION_BYTES, died="unavailable"), prepare=NOTHING)
     try:
         for number in (signal.SIGKILL, signal.SIGSEGV):
             trace = tmp_path / number.name
@@ -75,7 +78,7 @@ def test_what_is_killed_is_run_once_more(tmp_path: Path, portal: BlockingPortal)
     ],
 )
 def test_what_dies_twice_is_told(portal: BlockingPortal, died: Kind, number: int, kind: str) -> None:
-    computer = ProcessComputer(Limits(60.0, COMPUTATION_BYTES, died=died), prepare=fakes.prepare_nothing)
+    computer = ProcessComputer(Limits(60.0, COMPUTATION_BYTES, died=died), prepare=NOTHING)
     try:
         with pytest.raises(ApiError) as refused:
             portal.call(computer.run, signal.raise_signal, number)
@@ -96,7 +99,7 @@ def test_a_kernel_takes_longer_than_a_computation_may_and_outlives_its_request(
     os.mkfifo(begun)
     os.mkfifo(told)
     load = partial(fakes.load_between, begun=str(begun), told=str(told))
-    computer = ProcessComputer(Limits(0.01, COMPUTATION_BYTES), prepare=fakes.prepare_nothing, load=load)
+    computer = ProcessComputer(Limits(0.01, COMPUTATION_BYTES), prepare=NOTHING, load=load)
     try:
         left = portal.start_task_soon(computer.load, SHAPE)
         begun.read_text()  # waits until it compiles
@@ -114,7 +117,7 @@ def test_the_end_of_a_kernel_that_nobody_waits_for_is_not_logged(tmp_path: Path)
     os.mkfifo(begun)
     os.mkfifo(told)
     load = partial(fakes.load_between, begun=str(begun), told=str(told))
-    computers = [ProcessComputer(Limits(60.0, COMPUTATION_BYTES), prepare=fakes.prepare_nothing, load=load)]
+    computers = [ProcessComputer(Limits(60.0, COMPUTATION_BYTES), prepare=NOTHING, load=load)]
     logged: list[dict[str, object]] = []
 
     async def leave_and_close() -> None:
@@ -150,7 +153,7 @@ def test_it_is_ready_when_its_processes_are(tmp_path: Path, portal: BlockingPort
 
 
 def test_each_process_is_made_ready(tmp_path: Path, portal: BlockingPortal) -> None:
-    computer = ProcessComputer(Limits(60.0, COMPUTATION_BYTES), processes=3, prepare=fakes.prepare_nothing)
+    computer = ProcessComputer(Limits(60.0, COMPUTATION_BYTES), processes=3, prepare=NOTHING)
     try:
         portal.call(computer.ready, fakes.leave_a_trace, str(tmp_path))
         assert len(list(tmp_path.iterdir())) == 3
@@ -168,7 +171,7 @@ def test_a_process_that_cannot_be_made_ready_is_told(portal: BlockingPortal) -> 
 
 
 def test_a_kernel_that_fails_is_told_and_tried_again(portal: BlockingPortal) -> None:
-    computer = ProcessComputer(Limits(60.0, COMPUTATION_BYTES), prepare=fakes.prepare_nothing, load=fakes.load_dies)
+    computer = ProcessComputer(Limits(60.0, COMPUTATION_BYTES), prepare=NOTHING, load=fakes.load_dies)
     try:
         for _ in range(2):
             with pytest.raises(ApiError) as died:
@@ -193,7 +196,7 @@ async def taken(pieces: AsyncIterator[bytes], into: list[bytes]) -> None:
 
 
 def test_pieces_come_in_order_and_an_error_after_them(portal: BlockingPortal) -> None:
-    made = ProcessComputer(Limits(60.0, 2**30), prepare=fakes.prepare_nothing)
+    made = ProcessComputer(Limits(60.0, 2**30), prepare=NOTHING)
 
     async def take() -> None:
         pieces: list[bytes] = []
@@ -213,7 +216,7 @@ def test_pieces_come_in_order_and_an_error_after_them(portal: BlockingPortal) ->
 
 
 def test_who_leaves_ends_the_pieces_and_frees_the_process(portal: BlockingPortal) -> None:
-    made = ProcessComputer(Limits(600.0, 2**30), prepare=fakes.prepare_nothing)
+    made = ProcessComputer(Limits(600.0, 2**30), prepare=NOTHING)
 
     async def leave() -> None:
         process = await made.run(os.getpid)
@@ -229,7 +232,7 @@ def test_who_leaves_ends_the_pieces_and_frees_the_process(portal: BlockingPortal
 
 
 def test_a_killed_process_of_pieces_is_told_to_have_run_once(portal: BlockingPortal) -> None:
-    made = ProcessComputer(Limits(600.0, 2**30), prepare=fakes.prepare_nothing)
+    made = ProcessComputer(Limits(600.0, 2**30), prepare=NOTHING)
 
     async def kill() -> None:
         process = await made.run(os.getpid)
@@ -250,7 +253,7 @@ def test_a_killed_process_of_pieces_is_told_to_have_run_once(portal: BlockingPor
 
 
 def test_pieces_end_with_the_service(portal: BlockingPortal) -> None:
-    made = ProcessComputer(Limits(600.0, 2**30), prepare=fakes.prepare_nothing)
+    made = ProcessComputer(Limits(600.0, 2**30), prepare=NOTHING)
 
     async def end() -> None:
         pieces = made.stream(fakes.numbered, 0, 2**17)
@@ -265,7 +268,7 @@ def test_pieces_end_with_the_service(portal: BlockingPortal) -> None:
 
 
 def test_the_wait_for_a_process_ends(portal: BlockingPortal) -> None:
-    made = ProcessComputer(Limits(600.0, 2**30, turn_seconds=600.0), prepare=fakes.prepare_nothing)
+    made = ProcessComputer(Limits(600.0, 2**30, turn_seconds=600.0), prepare=NOTHING)
 
     async def wait() -> None:
         pieces = made.stream(fakes.numbered, 0, 2**17)
@@ -285,7 +288,7 @@ def test_the_wait_for_a_process_ends(portal: BlockingPortal) -> None:
 def test_who_leaves_waits_until_its_process_has_ended(tmp_path: Path, portal: BlockingPortal) -> None:
     told = tmp_path / "told"
     os.mkfifo(told)
-    made = ProcessComputer(Limits(600.0, 2**30, leave_seconds=0.0), prepare=fakes.prepare_nothing)
+    made = ProcessComputer(Limits(600.0, 2**30, leave_seconds=0.0), prepare=NOTHING)
 
     async def leave() -> None:
         running = asyncio.ensure_future(made.run(fakes.tell_and_wait, str(told)))

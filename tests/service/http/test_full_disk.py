@@ -101,7 +101,7 @@ def test_a_grid_is_smaller_than_the_room_it_asks_for(
     """HDF5 ends its process where a write fails, so that it must never come to that."""
     asked: list[int] = []
     monkeypatch.setattr(netcdf, "require_room", lambda _folder, size: asked.append(size))
-    large = service.submit({**spec, "axes": [{"path": "shaft.load", "linspace": [0.01, 0.5, 3_000]}]})
+    large = service.submit({**spec, "axes": [{"path": "shaft.load", "linspace": [0.01, 0.5, 1_000]}]})
     service.fill(large)
     for study_id in (ended, large):
         assert len(ask(service, study_id, "netcdf").content) < asked.pop()

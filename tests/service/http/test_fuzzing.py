@@ -37,12 +37,9 @@ HEAVY = {
         ),
         ("coverage",),
     ),
-    # Of bodies those of `change_study`, `create_token` and `put_components` stand for the others.
+    # Of bodies those of `change_study`, `create_token`, `put_components` and `save_view` stand for the others.
     **dict.fromkeys(
-        (
-            *("fit_clutch", "select_cases", "narrow_study", "run_longer", "save_view", "change_view"),
-            *("add_user", "change_user", "hand_over_user"),
-        ),
+        ("fit_clutch", "select_cases", "narrow_study", "run_longer", "add_user", "change_user", "hand_over_user"),
         ("coverage",),
     ),
 }

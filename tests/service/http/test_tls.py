@@ -47,7 +47,7 @@ def key_of_512_bits(folder: Path) -> Path:
 def test_a_service_with_a_certificate_speaks_https_only(tmp_path: Path) -> None:
     file, key = make(tmp_path)
     trust = ssl.create_default_context(cafile=str(file))
-    settings = {"SPRAG_TOKEN": TOKEN, "SPRAG_PROCESSES": "1"}
+    settings = {"SPRAG_TOKEN": TOKEN, "SPRAG_PROCESSES": "1", "SPRAG_CHECK_PROCESSES": "1"}
     with service(tmp_path, SPRAG_TLS_CERTIFICATE=str(file), SPRAG_TLS_KEY=str(key), **settings) as started:
         assert started.address.startswith("https://127.0.0.1:")
         with httpx.Client(base_url=started.address, verify=trust, timeout=600, trust_env=False) as client:

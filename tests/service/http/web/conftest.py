@@ -126,7 +126,7 @@ def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> 
 def office(tmp_path_factory: pytest.TempPathFactory, chromium: str) -> Iterator[Office]:
     """A service with a database of its own, for all tests."""
     with (
-        service(tmp_path_factory.mktemp("office"), SPRAG_PROCESSES="1") as started,
+        service(tmp_path_factory.mktemp("office"), SPRAG_PROCESSES="1", SPRAG_CHECK_PROCESSES="1") as started,
         httpx.Client(base_url=started.address, timeout=SECONDS) as client,
     ):
         yield Office(started.address, client)

@@ -7,7 +7,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from playwright.sync_api import expect
 
@@ -74,6 +74,7 @@ def filled(draw: st.DrawFn) -> dict[str, str]:
 
 
 @given(filled())
+@settings(max_examples=30)
 def test_a_machine_goes_there_and_back(values: dict[str, str]) -> None:
     base = base_of(values, {})
     again = {"model": values["model"]}
