@@ -159,6 +159,7 @@ def test_a_run_kept_in_a_database_is_found_there_by_whoever_has_the_token(
     assert sprag("admin", "db", "backup", copy, "--db", database).code == 0
     assert sprag("admin", "db", "backup", copy, "--db", database).code == 2
     assert sprag("admin", "db", "upgrade", "--db", copy, "--json").data["before"] is not None
+    assert "already at revision" in sprag("admin", "db", "upgrade", "--db", copy).out
     token = sprag("admin", "token").out.strip()
     app = create_app(
         Settings(database=str(copy), token=SecretStr(token)), computer=InThread(), checker=InThread(), writer=InThread()
@@ -231,9 +232,9 @@ def test_a_closed_standard_output_ends_quietly(tmp_path: Path, command: str, red
     assert ((tmp_path / "said").read_text(), (tmp_path / "code").read_text()) == ("", "141\n")
 
 
-def test_files_do_not_get_the_number_of_a_closed_stream(tmp_path: Path) -> None:
+def test_files_do_not_get_the_number_of_a_closed_stream() -> None:
     """What is said would otherwise be written into the database."""
-    command = [*COMMAND, "check", str(tmp_path / "none.json")]
+    command = [*COMMAND, "presets", "none"]
     for redirection in ("2>&-", "<&- >&- 2>&-"):
         done = subprocess.run(
             ["sh", "-c", f'"$@" {redirection}', "sh", *command],
