@@ -108,6 +108,7 @@ def limits() -> Iterator[Row]:
     yield "derived parameters of a study", f"{limit.MAX_DERIVED:,}"
     yield "quantities of a study, characters of a name", f"{limit.MAX_QUANTITIES:,}, {limit.MAX_QUANTITY_NAME:,}"
     yield "tolerances of a study, drawn drives", f"{limit.MAX_TOLERANCES:,}, {limit.MAX_DRIVES:,}"
+    yield "fresh drives of the best designs of a search", f"{limit.MAX_FRESH_DRIVES:,}"
     yield "starts of a case, initial values that differ", f"2 to {limit.MAX_STARTS:,}, {limit.MAX_START_RANGES}"
     yield "cases of a study", f"{limit.MAX_CASES:,}"
     yield "values on all axes together", f"{limit.MAX_AXIS_VALUES:,}"

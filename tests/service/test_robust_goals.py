@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, binomtest
 
+from sprag_study.service.cli import console, shown
 from sprag_study.service.results.fronts import designs_of
 from sprag_study.service.spec.design import design_spec
 from sprag_study.service.spec.document import SpecError, parse_spec
@@ -111,7 +112,9 @@ def test_the_designs_have_their_quantiles_and_yields(ended: tuple[Service, str])
         assert service.http.get(f"/studies/{study_id}{page}").status_code == 200
 
 
-def test_the_best_design_has_fresh_drives_and_their_intervals(ended: tuple[Service, str]) -> None:
+def test_the_best_design_has_fresh_drives_and_their_intervals(
+    ended: tuple[Service, str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     service, study_id = ended
     report = service.get(f"/studies/{study_id}/front")
     (fresh,), best = report["fresh"], report["designs"][0]
@@ -149,6 +152,12 @@ def test_the_best_design_has_fresh_drives_and_their_intervals(ended: tuple[Servi
     assert [line[at] != "" for line in lines] == [True] + [False] * 15
     assert float(lines[0][at]) == pytest.approx(wilson.low)
     assert lines[0][header.index("fresh.drives")] == str(FRESH)
+    for module in (console, shown):
+        monkeypatch.setattr(module, "piped", lambda: False)
+    shown.show_designs(report)
+    before, _, table = capsys.readouterr().out.partition("30 drives that the search has not seen")
+    assert "16 designs" in before
+    assert len([line for line in table.splitlines() if "rad/s" in line]) >= 4  # two limits at two points
     for page in ("", "/document"):
         assert "With 30 drives that the search has not seen" in service.http.get(f"/studies/{study_id}{page}").text
 

@@ -49,15 +49,10 @@ def searching(**changes: Any) -> dict[str, Any]:
     return {**json.loads(json.dumps(spec)), "goal": {**GOAL, **changes}}
 
 
-def test_a_search_is_cloned_with_all_that_it_asks_for() -> None:
-    for spec in (searching(), searching(start=[{}]), load_spec(preset_text("fastest_drive")[1], "toml")):
-        assert isinstance(spec, dict)
-        again, faults = spec_of(values_of(json.loads(json.dumps(spec))))
-        assert faults == {}
-        assert again["goal"] == spec["goal"]
-        assert parse_spec(again).study.plan == parse_spec(spec).study.plan
+def robust() -> dict[str, Any]:
+    """The same about drives."""
     drives = {"tolerances": [{"path": "shaft.load", "plus_minus": "5 %"}], "drives": 8}
-    robust = {
+    goal = {
         "best": [{"result": "efficiency", "max": True, "statistic": "mean"}],
         "subject_to": [
             {"result": "shaft.speed.mean", "statistic": "mean", "deviations": -3, "at_least": "6 rad/s"},
@@ -66,7 +61,17 @@ def test_a_search_is_cloned_with_all_that_it_asks_for() -> None:
         ],
         "fresh_drives": 50,
     }
-    spec = searching(**robust, at=[]) | drives
+    return searching(**goal, at=[]) | drives
+
+
+def test_a_search_is_cloned_with_all_that_it_asks_for() -> None:
+    for spec in (searching(), searching(start=[{}]), load_spec(preset_text("fastest_drive")[1], "toml")):
+        assert isinstance(spec, dict)
+        again, faults = spec_of(values_of(json.loads(json.dumps(spec))))
+        assert faults == {}
+        assert again["goal"] == spec["goal"]
+        assert parse_spec(again).study.plan == parse_spec(spec).study.plan
+    spec = robust()
     again, faults = spec_of(values_of(json.loads(json.dumps(spec))))
     assert faults == {}
     assert parse_spec(again).study.plan == parse_spec(spec).study.plan
@@ -219,3 +224,15 @@ def test_undo_takes_limits_in_the_units_in_which_they_were_typed(service: Servic
         answer = service.http.post("/new", data={**sent, "history": history})
         assert answer.status_code == 200
         assert Controls(answer.text).values[field].startswith(now)
+
+
+def test_a_search_about_drives_has_fields_for_what_of_them_counts(service: Service) -> None:
+    fields = Controls(service.http.get(f"/new?clone={service.submit(robust())}").text).values
+    assert fields["/goal/best/0/statistic"] == "mean"
+    assert fields["/goal/subject_to/0/deviations"] == "-3"
+    assert fields["/goal/subject_to/1/quantile"] == "95 %"
+    assert fields["/goal/subject_to/2/statistic"] == "deviation"
+    assert fields["/goal/fresh_drives"] == "50"
+    nominal = Controls(service.http.get(f"/new?clone={service.submit(searching())}").text).values
+    assert "/goal/subject_to/0/deviations" not in nominal
+    assert nominal["/goal/subject_to/0/value"]
