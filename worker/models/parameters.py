@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from functools import cache
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from sprag_study.engine.catalogue import Parameter
-    from sprag_study.worker.models.model import Model
     from sprag_study.worker.study import Study
 
 _INDEX: Final = re.compile(r"\.(\d+)(?=\.|$)")
@@ -37,15 +35,7 @@ def model_parameter(model: str, path: str) -> Parameter | None:
     wanted = {general, general.removeprefix("parts.N.")}
     if ".clutch." in general:
         wanted.add(general.removeprefix("pendulums.N."))
-    known = _places(model_of(model))
-    places = [known[path] for path in wanted if path in known]
-    return min(places)[1] if places else None
-
-
-@cache
-def _places(model: Model) -> dict[str, tuple[int, Parameter]]:
-    """The entries of a model's catalogue by path, each with its place in it."""
-    return {entry.path: (place, entry) for place, entry in reversed([*enumerate(model.parameters())])}
+    return next((entry for entry in model_of(model).parameters() if entry.path in wanted), None)
 
 
 def parameter_of(study: Study, path: str) -> Parameter | None:

@@ -23,7 +23,7 @@ from sprag_study.service.spec.machine.registry import part_of
 from sprag_study.service.spec.node import Node
 from sprag_study.service.spec.report import Report
 from sprag_study.worker import models
-from sprag_study.worker.models import Model, Parameter
+from sprag_study.worker.models import Parameter
 from sprag_study.worker.models import form as data
 from sprag_study.worker.models.parameters import general_path, model_parameter
 
@@ -136,11 +136,12 @@ def rows_of(values: Mapping[str, str], rows: data.Rows) -> int:
 
 def blocks(values: Mapping[str, str]) -> list[Block]:
     """The blocks of the machine in their order."""
-    return list(_blocks(current(), models.model_of(model_name(values)), frozenset(values.items())))
+    known = models.parameter_catalogue(model_name(values))
+    return list(_blocks(current(), known, frozenset(values.items())))
 
 
 @lru_cache(maxsize=8)
-def _blocks(_language: str, _model: Model, values: frozenset[tuple[str, str]]) -> tuple[Block, ...]:
+def _blocks(_language: str, _known: tuple[Parameter, ...], values: frozenset[tuple[str, str]]) -> tuple[Block, ...]:
     """What `blocks` gives: a page asks ten times for the blocks of one form."""
     return tuple(_Machine(dict(values)).blocks())
 
