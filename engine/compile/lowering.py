@@ -13,6 +13,7 @@ decides which products are fused with sums.
 import ast
 import math
 from collections.abc import Callable
+from functools import cache, partial
 from typing import Any, cast
 
 from llvmlite import ir
@@ -115,7 +116,8 @@ def lane_loops(text: str, first: str, second: str) -> Callable[[Any, float, floa
     ``first`` and ``second`` are the names under which the loops know the numbers a and b. The function can only be
     called from a numba function; it is compiled as part of that one.
     """
-    tree = fused(text)
+    # Whoever loads the caller's machine code from the cache needs no statements.
+    statements = cache(partial(fused, text))
 
     @intrinsic
     def run(typing_context: Any, W: Any, a: Any, b: Any, groups: Any) -> Any:  # noqa: ARG001
@@ -126,7 +128,7 @@ def lane_loops(text: str, first: str, second: str) -> Callable[[Any, float, floa
             builder.function.attributes.alignstack = _STACK_ALIGNMENT
             builder.function.attributes.add("nounwind")  # llvmlite writes no alignment alone
             numbers = {first: arguments[1], second: arguments[2]}
-            for loop in tree.body:
+            for loop in statements().body:
                 assert isinstance(loop, ast.For)
                 with (
                     cgutils.for_range(builder, arguments[3]) as group,

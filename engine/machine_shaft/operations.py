@@ -1,6 +1,7 @@
 """The resistance of the operation, and the weight and spring of a mechanism, as torques on the shaft."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -315,9 +316,10 @@ class Operation:
 
     def given_breaks(self) -> list[Floats]:
         """Those of ``breaks`` that are numbers of a step or of a table, or follow from them through the stroke."""
-        return self.breaks() if self._strokes or self._curve is not None or self._choice.form == "steps" else []
+        return list(self.breaks) if self._strokes or self._curve is not None or self._choice.form == "steps" else []
 
-    def breaks(self) -> list[Floats]:
+    @cached_property
+    def breaks(self) -> Sequence[Floats]:
         """Angles at which the torque jumps or has a kink, arrays of shape (cases or 1, n); NaN is none."""
         choice, values = self._choice, self._values
         if choice.quantity == "none":

@@ -196,7 +196,7 @@ class ShaftPart:
 
     def _torque_breaks(self) -> list[Floats]:
         """Angles of the part at which its torque has a kink or a jump, (cases or 1, n); NaN is none."""
-        breaks = list(self._operation.breaks())
+        breaks = list(self._operation.breaks)
         if self._stroke is not None and self.mechanism is not None:
             own = [self._stroke.start, self._stroke.end, *self.mechanism.breaks(self.values)]
             breaks += [every_revolution(angle, self._revolutions) for angle in own]

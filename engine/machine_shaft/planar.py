@@ -5,6 +5,7 @@ is balanced, and its inertia belongs to the drive's.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -53,6 +54,8 @@ _MOST = 16
 _TOUCHING = 1e-9
 _START, _END, _SWING = "stroke.start", "stroke.end", "stroke.swing"
 _COUNT, _SURPLUS = "stroke.count", "stroke.surplus"
+#: Place of the working part at the start, as `PlanarLinkage.travel` tells it.
+_HOME = "stroke.home_x", "stroke.home_y"
 
 
 class Pose(NamedTuple):
@@ -65,8 +68,19 @@ class Pose(NamedTuple):
 
 def numbers_of_element(values: Values, index: int) -> dict[str, Floats]:
     """The numbers of an element by their names."""
-    prefix = f"elements.{index}."
-    return {name.removeprefix(prefix): value for name, value in values.items() if name.startswith(prefix)}
+    return {name: values[path] for name, path in _paths_of_elements(tuple(values)).get(index, ())}
+
+
+@lru_cache(maxsize=64)
+def _paths_of_elements(paths: tuple[str, ...]) -> dict[int, list[tuple[str, str]]]:
+    """Names and paths of the numbers of each element: a root takes a hundred poses, each with the same names."""
+    by_element: dict[int, list[tuple[str, str]]] = {}
+    for path in paths:
+        subject, _, rest = path.partition(".")
+        if subject == "elements":
+            index, _, name = rest.partition(".")
+            by_element.setdefault(int(index), []).append((name, path))
+    return by_element
 
 
 def guide_line(each: Element, number: int, v: Mapping[str, Floats], pose: Pose) -> Line:
@@ -172,7 +186,7 @@ class PlanarLinkage(RodMechanism):
         place, _, lever = self.travel(pose)
         if self.working_link is None:
             return place.x
-        home = self.travel(self.pose(values, stroke[_START]))[0]
+        home = Vector(*(stroke[name] for name in _HOME))
         if self.working_link == FRAME:
             return np.asarray(place.x - home.x)
         # From half a turn before the middle of the arc to half a turn behind it.
@@ -203,11 +217,11 @@ class PlanarLinkage(RodMechanism):
         return total
 
     def prepared(self, values: Values) -> dict[str, Floats]:
-        """Ends of the forward stroke, the angle of its arc, the reversals in a turn, and where there are too many."""
+        """Ends of the forward stroke, its place and arc, the reversals in a turn, and where there are too many."""
         if self.working_link is None:
             return {}
         if _START in values:
-            return {name: values[name] for name in (_START, _END, _SWING, _COUNT, _SURPLUS)}
+            return {name: values[name] for name in (_START, _END, *_HOME, _SWING, _COUNT, _SURPLUS)}
         cases = max(len(value) for value in values.values())
         grid: Floats = np.asarray(_TURN / _ANGLES * np.arange(_ANGLES + 1), dtype=np.float64)
         grid_slope = self.travel(self.pose(values, grid[None, None, :]))[1]
@@ -235,14 +249,17 @@ class PlanarLinkage(RodMechanism):
         surplus[known & (count < 2.0)] = 0.0
         stroke = {_START: start, _END: end, _COUNT: count, _SURPLUS: surplus}
         shaped = {name: value.reshape(-1, 1, 1) for name, value in stroke.items()}
-        return shaped | {_SWING: self._swing(values, shaped[_START], shaped[_END])}
-
-    def _swing(self, values: Values, start: Floats, end: Floats) -> Floats:
-        """Angle of the arc between two angles of the crank, less than a turn; 0 for a working part on a guide."""
-        if self.working_link == FRAME:
-            return np.zeros_like(start)
         with np.errstate(invalid="ignore", divide="ignore"):
-            home, place = (self.travel(self.pose(values, angle))[0] for angle in (start, end))
+            home = self.travel(self.pose(values, shaped[_START]))[0]
+        shaped |= zip(_HOME, (home.x, home.y), strict=True)
+        return shaped | {_SWING: self._swing(values, home, shaped[_END])}
+
+    def _swing(self, values: Values, home: Vector, end: Floats) -> Floats:
+        """Angle of the arc from ``home`` to an angle of the crank, less than a turn; 0 for a part on a guide."""
+        if self.working_link == FRAME:
+            return np.zeros_like(end)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            place = self.travel(self.pose(values, end))[0]
             return np.asarray(np.mod(self._turned(home, place), _TURN))
 
     def dead_centres(self, values: Values) -> tuple[Floats, Floats]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from numpy.typing import NDArray
 from sprag_study.service.presets import ABOUT, preset_names, preset_text
 from sprag_study.service.spec.document import format_of, load_spec, parse_spec
 from sprag_study.worker import models
+from sprag_study.worker.axis import Axis
+from sprag_study.worker.limits import MAX_AXES
 from sprag_study.worker.study import Study
 
 MACHINES = [name for name in preset_names() if "machine-shaft" in preset_text(name)[1]]
@@ -70,17 +73,25 @@ def test_any_number_varies_alone_and_in_batches() -> None:
     for name in MACHINES:
         spec, paths = new_kinds(name, varied)
         base = parse_spec(spec).study
-        for path in paths:
-            parameter = models.parameters_of(base)[path]
-            value = base.base.get(path, 0.5)
-            values = [v for v in (0.97 * value, 1.02 * value + 1e-3) if parameter.accepts(v)]
-            study = parse_spec(spec | {"axes": [{"path": path, "values": list(dict.fromkeys(values))}]}).study
-            assert study.axis_paths == (path,)
+        axes = [Axis((path,), two_values(base, path)) for path in paths]
+        for first in range(0, len(paths), MAX_AXES):
+            some = paths[first : first + MAX_AXES]
+            given = [{"path": path, "values": [base.base.get(path, 0.5)]} for path in some]
+            assert parse_spec(spec | {"axes": given}).study.axis_paths == tuple(some)
+        for axis in axes:
+            study = replace(base, axes=(axis,))
             batch = models.run_chunk(study, 0, study.cases)
             alone = models.run_chunk(study, study.cases - 1, 1)
-            assert alone.endings == batch.endings[-1:], (name, path)
-            np.testing.assert_array_equal(alone.values[0], batch.values[-1], err_msg=f"{name}: {path}")
+            assert alone.endings == batch.endings[-1:], (name, axis.paths)
+            np.testing.assert_array_equal(alone.values[0], batch.values[-1], err_msg=f"{name}: {axis.paths}")
     assert len(varied) > 90
+
+
+def two_values(base: Study, path: str) -> tuple[float, ...]:
+    """Those of two values beside that of ``base`` that the number may have."""
+    value = base.base.get(path, 0.5)
+    accepts = models.parameters_of(base)[path].accepts
+    return tuple(dict.fromkeys(v for v in (0.97 * value, 1.02 * value + 1e-3) if accepts(v)))
 
 
 def decreasing(values: NDArray[np.float64], axis: int) -> bool:
