@@ -12,8 +12,11 @@ from sprag_study.service.storage.store import Store
 from sprag_study.worker.chunking import Chunking
 from tests.worker import fakes
 
+#: For tests of what the two drivers of a file may differ in: transactions, values of rows, and how a file is opened.
+EVERY_DRIVER = pytest.mark.parametrize("url", ["pysqlite3", "sqlite3", "postgresql"], indirect=True)
 
-@pytest.fixture(params=["pysqlite3", "sqlite3", "postgresql"])
+
+@pytest.fixture(params=["pysqlite3", "postgresql"])
 def url(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     if request.param == "postgresql":
         url: str = request.getfixturevalue("postgres_url")

@@ -13,8 +13,11 @@ from sprag_study.service.storage.tables import CHUNKS
 from sprag_study.service.storage.work.dispatchers import CLAIMED, run_owner
 from sprag_study.worker.ports import Chunk, EpochLostError
 from sprag_study.worker.states import StudyState
+from tests.contract.conftest import EVERY_DRIVER
 from tests.contract.filling import SPEC, create, finish
 from tests.worker import fakes
+
+pytestmark = EVERY_DRIVER
 
 
 def test_claims_are_granted_once_and_only_while_the_study_may_run(store: Store) -> None:

@@ -19,8 +19,11 @@ from sprag_study.service.storage.studies.listing import StudyFilter
 from sprag_study.worker import models
 from sprag_study.worker.ports import Chunk
 from sprag_study.worker.states import StudyState, TransitionError
+from tests.contract.conftest import EVERY_DRIVER
 from tests.contract.filling import SPEC, create, finish
 from tests.worker import fakes
+
+pytestmark = EVERY_DRIVER
 
 
 def test_a_study_comes_back_as_it_was_given(store: Store) -> None:

@@ -133,8 +133,7 @@ def _copies(place: int) -> Columns:
     return [odd_drive(rng, 2) for _ in range(place + 1)][place]
 
 
-@pytest.mark.parametrize("reset", ["contact", "literal"])
-@pytest.mark.parametrize("first", [None, 0.01, 0.04, 0.16])
+@pytest.mark.parametrize(("first", "reset"), [(None, "contact"), (0.01, "literal"), (0.16, "contact")])
 def test_two_copies_act_as_one_on_half_the_shaft(first: float | None, reset: str) -> None:
     """They lock, wind up and open at the same instants, so the second implementation runs one of them."""
     columns = _copies(185)

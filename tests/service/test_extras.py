@@ -34,7 +34,8 @@ def packages(extra: str) -> set[str]:
 def guarded() -> Iterator[tuple[str, str, str]]:
     """The file, the extra and the package of every import for which a message names an extra."""
     for file in SOURCES:
-        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+        text = file.read_text("utf-8")
+        for node in ast.walk(ast.parse(text)) if "naming_extra" in text else ():
             calls = [item.context_expr for item in node.items] if isinstance(node, ast.With) else []
             for call in calls:
                 if not (isinstance(call, ast.Call) and getattr(call.func, "id", "") == "naming_extra"):

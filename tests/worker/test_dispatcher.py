@@ -288,8 +288,7 @@ def test_it_shows_that_it_is_alive_and_polls_when_it_is_time(store: Store) -> No
     assert len(set(beats)) >= 3
 
 
-@pytest.mark.parametrize("size", [1, 7, 40])
-@pytest.mark.parametrize("processes", [1, 2])
+@pytest.mark.parametrize(("size", "processes"), [(1, 2), (7, 1), (7, 2), (40, 1)])
 def test_rows_do_not_depend_on_chunks_and_processes(tmp_path: Path, size: int, processes: int) -> None:
     with Store.open(f"sqlite:///{tmp_path / 'a.sqlite3'}", chunking=Chunking(cases=size)) as store:
         record = submit(store, 40)

@@ -50,7 +50,7 @@ def parameters(study: Study, case: int) -> dict[str, float]:
 
 
 @given(studies(), studies())
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 def test_the_cases_found_are_those_with_equal_parameters(new: Study, old: Study) -> None:
     expected = {
         (ours, theirs)
@@ -64,7 +64,7 @@ def test_the_cases_found_are_those_with_equal_parameters(new: Study, old: Study)
 
 
 @given(studies(), studies())
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 def test_cases_have_equal_keys_where_their_parameters_are_equal(new: Study, old: Study) -> None:
     ours, theirs = case_keys(new, "kin").tolist(), case_keys(old, "kin").tolist()
     for one, key in enumerate(ours):
@@ -80,7 +80,7 @@ def test_zero_has_one_key() -> None:
 
 
 @given(studies(), st.lists(studies(), min_size=1, max_size=4))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_no_study_is_ruled_out_that_has_a_case(new: Study, others: list[Study]) -> None:
     wanted = Wanted(new)
     may = wanted.may_share(np.stack([span(other) for other in others]))

@@ -68,8 +68,7 @@ def test_motor_slopes_and_steady_speeds(motor: Motor) -> None:
     assert np.max(torque) <= 900.0
 
 
-@pytest.mark.parametrize("motor", ["linear", "kloss"])
-@pytest.mark.parametrize(("inertia", "force"), [(0.7, 4e3), (15.0, 2e4)])
+@pytest.mark.parametrize(("motor", "inertia", "force"), [("linear", 0.7, 4e3), ("kloss", 15.0, 2e4)])
 def test_limit_cycle_is_what_marching_comes_to(motor: Motor, inertia: float, force: float) -> None:
     spec = replace(PRESS, balance="motor", drive=Drive(motor=motor))
     numbers = {path: value for path, value in PRESS_NUMBERS.items() if path != "mean_speed"}

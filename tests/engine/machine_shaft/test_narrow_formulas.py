@@ -19,8 +19,8 @@ from tests.engine.machine_shaft.machines import NAMES, one, results_of
 Floats = NDArray[np.float64]
 
 _RNG = np.random.default_rng(20)
-WIDTHS = 10.0 ** np.linspace(0.0, -6.0, 200)
-PLACES = _RNG.uniform(0.0, 2.0 * math.pi, 200)
+WIDTHS = 10.0 ** np.linspace(0.0, -6.0, 61)
+PLACES = _RNG.uniform(0.0, 2.0 * math.pi, 61)
 
 
 def _work(area: Callable[[Floats], Floats]) -> Floats:
@@ -50,19 +50,19 @@ NUMBERS: dict[str, Any] = {"mean_speed": 100.0, "drive.inertia": 5.0, "constants
 
 @pytest.mark.parametrize(("formula", "work"), PEAKS)
 def test_peaks_of_any_width_do_their_work(formula: str, work: Floats) -> None:
-    results = results_of(_torque(formula), NUMBERS, cases=200)
+    results = results_of(_torque(formula), NUMBERS, cases=61)
     np.testing.assert_allclose(-results["work.resistance"], work, rtol=1e-9)
 
 
 def test_peaks_of_any_width_change_the_energy_at_once() -> None:
     """Beside a peak the drive has lifted the energy all through the cycle, and it falls within the peak."""
-    results = results_of(_torque("10 + 100/w*exp(-((phi-a)/w)^2)"), NUMBERS, cases=200)
+    results = results_of(_torque("10 + 100/w*exp(-((phi-a)/w)^2)"), NUMBERS, cases=61)
     narrow = WIDTHS < 1e-3
     np.testing.assert_allclose(results["energy.fluctuation"][narrow], 100.0 * math.sqrt(math.pi), rtol=0.02)
 
 
 def test_pulses_of_any_width_are_right_or_refused() -> None:
-    batch = simulate(_torque("10 + 100*if(abs(phi-a) < w, 1/w, 0)"), NUMBERS, cases=200)
+    batch = simulate(_torque("10 + 100*if(abs(phi-a) < w, 1/w, 0)"), NUMBERS, cases=61)
     known = batch.endings == ENDINGS.index(Ending.OK)
     assert set(batch.endings[~known]) <= {ENDINGS.index(Ending.QUADRATURE_NOT_REACHED)}
     assert known[WIDTHS > 1e-5].all()

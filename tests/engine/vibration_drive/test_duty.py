@@ -219,11 +219,11 @@ class Watched(Drive):
         super().wind(i, y, windup, state)
 
 
-@pytest.mark.parametrize("columns", [TWO, DAMPED, *(damped(2, seed, 2)[1] for seed in (302, 308, 321, 328))])
+@pytest.mark.parametrize("columns", [TWO, DAMPED, damped(2, 308, 2)[1]], ids=["two", "damped", "random"])
 def test_duty_is_that_of_an_independent_integration(columns: Columns) -> None:
-    duty, machine = duty_of(examined(columns, periods(24, 14, 24))), Watched(columns)
-    machine.run(24, (14, 24))
-    largest, hours = machine.out.largest, 10.0 / columns["excitation.frequency"] / 3600.0
+    duty, machine = duty_of(examined(columns, periods(14, 8, 14))), Watched(columns)
+    machine.run(14, (8, 14))
+    largest, hours = machine.out.largest, 6.0 / columns["excitation.frequency"] / 3600.0
     for i, bears in enumerate(duty.rows):
         assert round(bears.engagements_per_hour * hours) == len(machine.impacts[i])
         assert bears.impact_speed_max == pytest.approx(max(machine.impacts[i]), rel=1e-7)

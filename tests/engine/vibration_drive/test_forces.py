@@ -25,7 +25,6 @@ G = 9.80665
 BEARING = Bearing(rating=6000.0, exponent=10.0 / 3.0, share=0.6, shaft_mass=0.7)
 SETTLED = {
     "one": drive(1),
-    "two": drive(2, **pendulum(1, spring_rate=10000.0), shaft__load=0.3),
     "held": drive(1, **pendulum(0, backlash=1.0), shaft__load=5.0),
     "no load": drive(1, shaft__load=0.0),
     "locking": drive(1, **pendulum(0, backlash=0.0), **clutch(0.4, 200.0, 0.0, 2e4)),
@@ -46,6 +45,7 @@ def test_of_a_settled_motion_the_mean_force_is_the_weight_and_the_axes_give_the_
     found = table.results
     assert table.ending is Ending.OK
     assert table.start == 0.0
+    assert tuple(found) == tuple(info.name for info in force_infos(1))
     assert table.end * columns["excitation.frequency"] == pytest.approx(row["regime.order"])
     assert found["balance.force"] < 1e-12
     largest, n = found["table.force.max"], round(sum(name.endswith("spring.force.max") for name in found))
@@ -117,7 +117,7 @@ def test_a_shaft_that_stands_and_a_bearing_without_a_rating_have_no_life() -> No
 
 
 def test_results_are_those_described_and_none_where_a_case_fails() -> None:
-    table = settled(SETTLED["two"])[0]
+    table = forces(drive(2), periods(3, 1, 3), BEARING, 50)
     assert tuple(table.results) == tuple(info.name for info in force_infos(2))
     spinning = drive(1, **pendulum(0, spring_rate=0.0, initial_speed=1e9))
     failed = forces(spinning, periods(3, 0, 3), BEARING, 50)
@@ -221,7 +221,7 @@ def compare_forces(columns: Columns, closely: float = 1e-9) -> bool:
 
 
 @pytest.mark.parametrize("machines", [random_machines, damped])
-@pytest.mark.parametrize("number", range(8))
+@pytest.mark.parametrize("number", range(3))
 def test_an_independent_integrator_agrees(machines: Callable[..., list[Columns]], number: int) -> None:
     (columns,) = machines(1 + number % 2, 700 + number, 1)
     if not compare_forces(columns):

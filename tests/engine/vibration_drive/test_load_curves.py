@@ -62,14 +62,14 @@ def tabled(pendulums: int, seed: int, cases: int) -> list[Columns]:
     return machines
 
 
-@pytest.mark.parametrize("number", range(5))
+@pytest.mark.parametrize("number", range(3))
 def test_an_independent_integrator_agrees_on_tables(number: int) -> None:
     (columns,) = tabled(1, 500 + number, 1)
-    if not compare(columns, "literal" if number == 4 else "contact", 1e-9):
+    if not compare(columns, "literal" if number == 2 else "contact", 1e-9):
         pytest.skip("too sensitive to conclude anything")
 
 
-@pytest.mark.parametrize("number", range(18))
+@pytest.mark.parametrize("number", range(6))
 def test_an_independent_integrator_agrees(number: int) -> None:
     (columns,) = bent(1, 500 + number, 1)
     if not compare(columns, "literal" if number % 6 == 5 else "contact", 1e-9):

@@ -29,6 +29,7 @@ from sprag_study.engine.vibration_drive.starts import settle_starts, started_inf
 from sprag_study.engine.vibration_drive.strobes import ANGLE, SHAFT_WIDTH
 from sprag_study.engine.vibration_drive.sweep import sweep
 from sprag_study.engine.vibration_drive.transients import simulate_judged
+from tests.engine.vibration_drive.drive import clutch
 
 Floats = NDArray[np.float64]
 
@@ -47,8 +48,7 @@ CIRCLE: dict[str, Any] = {
     "pendulums.0.initial_angle": -2.0,
     "shaft.inertia": SHAFT,
     "shaft.initial_speed": NU,
-    "clutch.coefficients.0": 0.0,
-    "clutch.coefficients.1": STIFFNESS,
+    **clutch(0.0, STIFFNESS),
 }
 #: The torque of the vibration at most, and the load at which the pendulum falls out of step.
 LARGEST = MASS * ARM * D * NU**2
@@ -194,7 +194,7 @@ def test_a_parametric_pendulum_falls_out_of_step_where_scipy_and_a_perturbation_
             "excitation.phase": -0.5 * math.pi, "pendulums.0.inertia": 0.01, "pendulums.0.mass": 1.0,
             "pendulums.0.arm": -0.1, "pendulums.0.damping": 0.01 * h * own, "pendulums.0.initial_speed": -nu,
             "pendulums.0.initial_angle": 1.0, "shaft.inertia": 1.0, "shaft.load": 1.0,
-            "clutch.coefficients.0": 0.0, "clutch.coefficients.1": 10.0,
+            **clutch(0.0, 10.0),
         }  # fmt: skip
 
     batch = settle(machines(np.array([1.0])), SettledRun(), cases=1)

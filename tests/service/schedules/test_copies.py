@@ -102,8 +102,7 @@ def by_move(store: Store, target: Path) -> None:
         other.close()
 
 
-@pytest.mark.parametrize("copied", [by_cp, by_backup, by_move])
-@pytest.mark.parametrize("fired", [True, False], ids=["after a night", "before the first night"])
+@pytest.mark.parametrize(("copied", "fired"), [(by_cp, True), (by_backup, False), (by_move, True), (by_move, False)])
 def test_a_copy_fires_nothing_until_it_is_adopted_and_the_original_goes_on(
     copied: Callable[[Store, Path], None], fired: bool, settings: Settings, clock: Clock, opening: Opening, hook: Hook,
     tmp_path: Path, caplog: pytest.LogCaptureFixture, connect: Callable[..., httpx.Client],

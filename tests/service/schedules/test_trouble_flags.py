@@ -213,7 +213,7 @@ def test_a_near_name_is_offered_and_very_long_lists_are_bounded() -> None:
         read_fields({**NIGHTLY, "trouble_flags": ["unsetled"]}, NEW_YEAR)
     assert "is not a flag of the model vibration-drive" in str(error.value)
     with pytest.raises(SpecError) as error:
-        read_fields({**NIGHTLY, "trouble_flags": ["x"] * 1_000_000}, NEW_YEAR)
+        read_fields({**NIGHTLY, "trouble_flags": ["x"] * 200_000}, NEW_YEAR)
     assert len(error.value.faults) < 1000
 
 

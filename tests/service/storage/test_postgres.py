@@ -384,7 +384,7 @@ def test_workers_share_studies_and_take_over_those_of_one_that_is_killed_or_lose
         workers = [worker(postgres_url), worker(postgres_url)]
         try:
             eventually(lambda: len([record for record in store.dispatchers.all() if record.usable]) == 2)
-            studies = [store.studies.create({}, fakes.study(400, f"{number}"), fresh=True) for number in range(4)]
+            studies = [store.studies.create({}, fakes.study(200, f"{number}"), fresh=True) for number in range(4)]
             eventually(lambda: {record.studies for record in store.dispatchers.all()} == {2})
             eventually(lambda: all(store.studies.get(record.id).done for record in studies))
             workers[0].send_signal(signal.SIGKILL)
@@ -404,9 +404,9 @@ def test_workers_share_studies_and_take_over_those_of_one_that_is_killed_or_lose
                 )
             assert workers[1].wait(DEADLINE) == 3
             eventually(lambda: all(store.studies.get(record.id).state is StudyState.FINISHED for record in studies))
-            expected = models.run_chunk(fakes.study(400), 0, 400).values
+            expected = models.run_chunk(fakes.study(200), 0, 200).values
             for record in studies:
-                np.testing.assert_array_equal(store.rows.block(record.id, limit=400).values, expected)
+                np.testing.assert_array_equal(store.rows.block(record.id, limit=200).values, expected)
         finally:
             for process in workers:
                 process.terminate()
@@ -458,7 +458,7 @@ def test_a_server_that_crashes_ends_the_worker_with_a_sentence_and_loses_nothing
     with postgres.running() as server:
         url = server.url(server.new_database())
         with Store.open(url, chunking=Chunking(cases=4)) as store:
-            study = fakes.study(400)  # enough that the first worker is not through before the server crashes
+            study = fakes.study(200)  # enough that the first worker is not through before the server crashes
             record = store.studies.create({}, study)
             with worker(url) as process:
                 eventually(lambda: store.studies.get(record.id).done > 0)
@@ -475,6 +475,6 @@ def test_a_server_that_crashes_ends_the_worker_with_a_sentence_and_loses_nothing
                 eventually(lambda: store.studies.get(record.id).state is StudyState.FINISHED)
                 process.terminate()
             assert process.returncode == 0
-            block = store.rows.block(record.id, limit=400)
-            assert block.cases.tolist() == list(range(400))
-            np.testing.assert_array_equal(block.values, models.run_chunk(study, 0, 400).values)
+            block = store.rows.block(record.id, limit=200)
+            assert block.cases.tolist() == list(range(200))
+            np.testing.assert_array_equal(block.values, models.run_chunk(study, 0, 200).values)

@@ -232,7 +232,7 @@ def test_a_plan_names_what_is_wrong(change: dict[str, Any], named: str) -> None:
     assert CalibratePlan.from_json(plan.to_json()) == plan
 
 
-@pytest.mark.parametrize("seed", [1, 3, 7])
+@pytest.mark.parametrize("seed", [1, 3])
 def test_a_fit_that_explains_its_values_badly_begins_again(seed: int) -> None:
     """The first scan of each of these misses the valley, which is a hundredth of the range wide."""
 

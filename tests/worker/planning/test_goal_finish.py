@@ -154,7 +154,7 @@ def _kinked(points: Floats) -> dict[str, Floats]:
     return {"f": np.abs(x - 0.31) + np.abs(y - x) + noise, "c": np.where(y > 0.4, 1.5, 0.5) + x}
 
 
-@pytest.mark.parametrize("seed", range(1, 5))
+@pytest.mark.parametrize("seed", [1, 2])
 def test_the_best_is_never_worse_whatever_the_function(seed: int) -> None:
     for fields in ({}, {"subject_to": (Limit("c", "at_most", 1.0),)}):
         plans = [plan_of(2, ["f"], seed=seed, generations=5, finish=finish, **fields) for finish in (False, True)]
