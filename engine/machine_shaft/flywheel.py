@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag_study.engine import elementary
 from sprag_study.engine.machine_shaft.columns import Columns
 from sprag_study.engine.machine_shaft.results import result_infos
 from sprag_study.engine.machine_shaft.roots import bracketed_roots
@@ -14,6 +15,8 @@ from sprag_study.engine.machine_shaft.spec import MeanSpeed
 from sprag_study.engine.machine_shaft.start import Shape, Stop, least_mean_speed, mean_speed
 
 Floats = NDArray[np.float64]
+#: Steps of Newton's method to the diameter of a ring; a thick one with little inertia takes the most.
+_NEWTON = 60
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,10 +25,14 @@ class Flywheel:
 
     A thin rim of the mean diameter D has J = m D^2/4 and the hoop stress rho v^2 with v = omega D/2. A solid disc has
     J = m D^2/8 and, at its centre, the stress (3 + nu)/8 rho v^2 with v at its edge (S. P. Timoshenko, J. N. Goodier,
-    *Theory of Elasticity*, section 32).
+    *Theory of Elasticity*, section 32). A ring is a rim of the width b and the thickness t about the mean diameter D:
+    m = pi rho D b t, J = m (D^2 + t^2)/4, and with s = t/D and v = omega D/2 the largest stress, at its inner edge, is
+    rho v^2 ((3 + nu) (1 + s)^2 + (1 - nu) (1 - s)^2)/4 (the same section).
 
     Attributes
     ----------
+    values : mapping
+        The numbers by name, with the mass of a ring.
     form : array
         J/(m D^2).
     factor : array
@@ -35,7 +42,7 @@ class Flywheel:
     """
 
     values: Mapping[str, Floats]
-    form: float
+    form: Floats
     factor: Floats
     ratio: Floats
 
@@ -44,8 +51,21 @@ class Flywheel:
         """The flywheel of the ``values`` by path, on a shaft of the ``ratio``."""
         prefix = "drive.flywheel."
         own = {path.removeprefix(prefix): value for path, value in values.items() if path.startswith(prefix)}
+        if shape == "ring":
+            return cls._ring(own, ratio)
         factor = 1.0 if shape == "rim" else (3.0 + own["poisson_ratio"]) / 8.0
-        return cls(own, 0.25 if shape == "rim" else 0.125, np.asarray(factor), ratio)
+        return cls(own, np.asarray(0.25 if shape == "rim" else 0.125), np.asarray(factor), ratio)
+
+    @classmethod
+    def _ring(cls, own: dict[str, Floats], ratio: Floats) -> "Flywheel":
+        diameter, thickness, nu = own["diameter"], own["thickness"], own["poisson_ratio"]
+        # One that is thicker than its mean diameter has no inner edge.
+        thickness = np.where(thickness <= diameter, thickness, np.nan)
+        share = thickness / diameter
+        mass = np.pi * own["density"] * diameter * own["width"] * thickness
+        outer, inner = np.square(1.0 + share), np.square(1.0 - share)
+        factor = 0.25 * ((3.0 + nu) * outer + (1.0 - nu) * inner)
+        return cls(own | {"mass": mass}, np.asarray(0.25 * (1.0 + np.square(share))), np.asarray(factor), ratio)
 
     @property
     def inertia(self) -> Floats:
@@ -76,12 +96,27 @@ class Flywheel:
         stress = factor * own["density"] * np.square(speed)
         needed = np.maximum(required - (drive - inertia * np.square(ratio)), 0.0) / np.square(ratio)
         margin = np.sqrt(own["allowed_stress"] / stress)
+        form = np.broadcast_to(self.form.ravel(), (cases,))
         return {
             "flywheel.inertia": inertia, "flywheel.speed": speed, "flywheel.stress": stress,
             "flywheel.margin": np.where(np.isfinite(margin), margin, np.nan),
-            "flywheel.required_mass": needed / (self.form * np.square(own["diameter"])),
-            "flywheel.required_diameter": np.sqrt(needed / (self.form * own["mass"])),
+            "flywheel.required_mass": needed / (form * np.square(own["diameter"])),
+            "flywheel.required_diameter": _ring_diameter(own, needed) if "width" in own
+            else np.sqrt(needed / (form * own["mass"])),
         }  # fmt: skip
+
+
+def _ring_diameter(own: Mapping[str, Floats], inertia: Floats) -> Floats:
+    """Mean diameter at which a ring of this section has the ``inertia``: the root of D^3 + t^2 D = 4 J/(pi rho b t)."""
+    square = np.square(own["thickness"])
+    wanted = 4.0 * inertia / (np.pi * own["density"] * own["width"] * own["thickness"])
+    diameter = elementary.power(wanted, 1.0 / 3.0)
+    # The cubic is convex and the start above its root, so that Newton's method falls to it.
+    for _ in range(_NEWTON):
+        diameter = diameter - (diameter * (np.square(diameter) + square) - wanted) / (
+            3.0 * np.square(diameter) + square
+        )
+    return np.asarray(diameter)
 
 
 def required_inertia(mechanism: Shape, torque: Floats, kind: MeanSpeed, mean: Floats, wanted: Floats) -> Floats:

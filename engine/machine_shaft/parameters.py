@@ -9,6 +9,7 @@ from sprag_study.engine.catalogue import IN_MM, IN_RPM, STANDARD_GRAVITY, Parame
 from sprag_study.engine.machine_shaft.elements import ElementKind
 from sprag_study.engine.machine_shaft.spec import (
     MOVING,
+    Flywheel,
     MachineSpec,
     MechanismChoice,
     MechanismKind,
@@ -167,9 +168,11 @@ _MOTOR = {
     "table": (Parameter("drive.motor.scale", "k_m", "1", 0.0, 1e12, True, 1.0, "factor on the torques of its table"),),
 }
 
-_FLYWHEEL = (
+_WHEEL = (
     _length("drive.flywheel.diameter", "D", "mean diameter of the rim, or outer diameter of the disc"),
     Parameter("drive.flywheel.mass", "m", "kg", 0.0, 1e9, True, None, "mass of the rim or disc"),
+    _length("drive.flywheel.width", "b", "width of the rim along its shaft"),
+    _length("drive.flywheel.thickness", "t", "thickness of the rim along its radius"),
     Parameter("drive.flywheel.density", "rho", "kg/m^3", 0.0, 1e5, True, 7850.0, "density of its material"),
     Parameter("drive.flywheel.poisson_ratio", "nu", "1", 0.0, 0.5, False, 0.3, "Poisson's ratio of its material"),
     Parameter("drive.flywheel.allowed_stress", "s_a", "Pa", 0.0, 1e12, True, _INF, "stress that determines its margin"),
@@ -318,6 +321,12 @@ def _drive(spec: MachineSpec) -> tuple[Parameter, ...]:
     return (Parameter("drive.scale", "k_d", "1", -_ANY, _ANY, False, 1.0, "factor on the driving torque"),)
 
 
+def _flywheel(kind: Flywheel) -> tuple[Parameter, ...]:
+    """Parameters of a flywheel: a mass, or of a ring the width and the thickness that give it."""
+    foreign = {"drive.flywheel.mass"} if kind == "ring" else {"drive.flywheel.width", "drive.flywheel.thickness"}
+    return tuple(entry for entry in _WHEEL if entry.path not in foreign)
+
+
 def parameters(spec: MachineSpec) -> tuple[Parameter, ...]:
     """Every numeric parameter of a machine of this structure, in SI units."""
     speed = (
@@ -346,7 +355,7 @@ def parameters(spec: MachineSpec) -> tuple[Parameter, ...]:
             "irregularity that determines the required inertia",
         ),
         *_drive(spec),
-        *(_FLYWHEEL if spec.drive.flywheel else ()),
+        *(_flywheel(spec.drive.flywheel) if spec.drive.flywheel else ()),
         *chain.from_iterable(_stage(index, kind) for index, kind in enumerate(spec.drive.stages)),
         *chain.from_iterable(_part(prefix, part, spec.cycle) for prefix, part in spec.every_part()),
         *(

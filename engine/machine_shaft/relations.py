@@ -13,10 +13,12 @@ def check_relations(spec: MachineSpec, row: Columns) -> None:
     Raises
     ------
     RelationError
-        A belt with a mass but without a radius; discharge below suction, or above what the clearance lets the
-        compressor reach; a step over the stroke that ends before it begins.
+        A belt with a mass but without a radius; a rim that is thicker than its mean diameter; discharge below suction,
+        or above what the clearance lets the compressor reach; a step over the stroke that ends before it begins.
     """
     _check_stages(spec, row)
+    if spec.drive.flywheel == "ring":
+        _check_ring(row)
     for prefix, part in spec.every_part():
         if part.operation.quantity == "gas":
             _check_gas(row, f"{prefix}operation.gas.")
@@ -34,6 +36,14 @@ def _check_stages(spec: MachineSpec, row: Columns) -> None:
                 else Sentence("is needed for the speed of the chain, which has a mass")
             )
             raise RelationError(path, 0.0, message, alone(">", amount(0.0, "m")))
+
+
+def _check_ring(row: Columns) -> None:
+    path = "drive.flywheel.thickness"
+    thickness, diameter = (float(row.row(name)[0]) for name in (path, "drive.flywheel.diameter"))
+    if thickness > diameter:
+        message = Sentence("is more than the mean diameter of the rim, so that there is no inner edge")
+        raise RelationError(path, thickness, message, alone("<=", amount(diameter, "m")))
 
 
 def _check_steps(row: Columns, prefix: str, steps: int) -> None:

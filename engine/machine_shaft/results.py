@@ -87,7 +87,7 @@ MACHINE_RESULTS: tuple[ResultInfo, ...] = (
     _R("flywheel.stress", "Pa", "largest stress of the flywheel by its rotation"),
     _R("flywheel.margin", "1", "burst margin: speed at which the stress is the allowed one / largest speed"),
     _R("flywheel.required_mass", "kg", "mass of the flywheel at its diameter that gives the wanted irregularity"),
-    _R("flywheel.required_diameter", "m", "diameter of the flywheel with its mass that gives the wanted irregularity"),
+    _R("flywheel.required_diameter", "m", "diameter at which its mass or section gives the wanted irregularity"),
     _R("cycle.multiplier", "1", "factor by which a small deviation of the speed grows in a cycle: stable below 1"),
 )  # fmt: skip
 

@@ -12,7 +12,7 @@ MeanSpeed = Literal["midrange", "angle", "time"]
 Balance = Literal["scale", "constant", "refuse", "motor"]
 BalanceSide = Literal["drive", "operation"]
 Motor = Literal["linear", "kloss", "table"]
-Flywheel = Literal["rim", "disc"]
+Flywheel = Literal["rim", "disc", "ring"]
 Stage = Literal["gear", "belt", "chain", "worm", "screw_nut", "rack"]
 MechanismKind = Literal[
     "none", "table", "formula", "slider_crank", "scotch_yoke", "four_bar", "parallel_crank",

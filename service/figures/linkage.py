@@ -255,7 +255,7 @@ def _flywheel(x: float) -> Iterator[str]:
 
 
 def _flywheel_numbers(x: float, base: Mapping[str, float]) -> Iterator[Dimension]:
-    for name, y in (("mass", -28.0), ("diameter", 28.0)):
+    for name, y in (("mass", -28.0), ("width", -28.0), ("diameter", 28.0)):
         if f"drive.flywheel.{name}" in base:
             yield Dimension(f"drive.flywheel.{name}", "", x + 6, _LEVEL + y, "right")
 

@@ -69,7 +69,7 @@ class ShaftDriveStage(TypedDict, total=False):
 class ShaftDriveFlywheel(TypedDict, total=False):
     """A flywheel given by its dimensions, on a shaft of the train.
 
-    kind : Shape of the flywheel: a thin rim or a solid disc.
+    kind : Shape of the flywheel: thin rim or solid disc by the mass, or ring: a rim by width and thickness.
     shaft : Number of the shaft on which it sits: K is the input shaft of stage K, 0 the motor's; by default the main
         shaft.
     diameter : Mean diameter of the rim, or outer diameter of the disc (D), m; > 0 m and <= 1000 m.
@@ -77,15 +77,19 @@ class ShaftDriveFlywheel(TypedDict, total=False):
     density : Density of its material (rho), kg/m^3; > 0 kg/m^3 and <= 100000 kg/m^3.
     poisson_ratio : Poisson's ratio of its material (nu); >= 0 and <= 0.5.
     allowed_stress : Stress that determines its margin (s_a), Pa; > 0 Pa and <= 1e+12 Pa.
+    width : Width of the rim along its shaft (b), m; > 0 m and <= 1000 m.
+    thickness : Thickness of the rim along its radius (t), m; > 0 m and <= 1000 m.
     """
 
-    kind: Literal["rim", "disc"]
+    kind: Literal["rim", "disc", "ring"]
     shaft: int
     diameter: Quantity
     mass: Quantity
     density: Quantity
     poisson_ratio: Quantity
     allowed_stress: Quantity
+    width: Quantity
+    thickness: Quantity
 
 
 class ShaftDrive(TypedDict, total=False):
@@ -100,7 +104,7 @@ class ShaftDrive(TypedDict, total=False):
     stages : Stages between motor and main shaft, motor first; fields kind, ratio, efficiency, output_inertia, inertia,
         mass, radius, lead; needed: kind.
     flywheel : A flywheel given by its dimensions, on a shaft of the train; fields kind, shaft, diameter, mass, density,
-        poisson_ratio, allowed_stress; needed: kind, diameter, mass.
+        poisson_ratio, allowed_stress, width, thickness; needed: kind, diameter.
     """
 
     inertia: Quantity
@@ -562,6 +566,8 @@ class Shaft(Studies):
         "drive.flywheel.density",
         "drive.flywheel.poisson_ratio",
         "drive.flywheel.allowed_stress",
+        "drive.flywheel.width",
+        "drive.flywheel.thickness",
         "mechanism.slider_crank.crank",
         "mechanism.slider_crank.rod",
         "mechanism.slider_crank.offset",

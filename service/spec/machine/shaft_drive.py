@@ -17,7 +17,6 @@ from sprag_study.service.spec.machine.shaft_parts import (
     value_in,
 )
 from sprag_study.service.spec.node import Node
-from sprag_study.service.spec.schema.quantity import required_of
 from sprag_study.worker.models import Parameter, machine_shaft
 
 BALANCE_SIDE: Final = choice(
@@ -31,7 +30,10 @@ BALANCE: Final = choice("balance", _BALANCE_HELP, "constant", "scale", "refuse",
 MOTOR: Final = choice("kind", "kind of the motor", "linear", "kloss", "table")
 #: The rows of a motor's table.
 _SPEED: Final = Parameter("speed", "w", "rad/s", 0.0, 1e6, False, None, "speed of the motor")
-FLYWHEEL: Final = choice("kind", "shape of the flywheel: a thin rim or a solid disc", "rim", "disc")
+FLYWHEEL: Final = choice(
+    "kind", "shape of the flywheel: thin rim or solid disc by the mass, or ring: a rim by width and thickness",
+    "rim", "disc", "ring",
+)  # fmt: skip
 _ON_SHAFT: Final = (
     "number of the shaft on which it sits: K is the input shaft of stage K, 0 the motor's; by default the main shaft"
 )
@@ -51,7 +53,7 @@ _WHEEL: Final = numbers_under("drive.flywheel.")
 _FLYWHEEL: Final = Record(
     {"kind": FLYWHEEL, FLYWHEEL_SHAFT.name: FLYWHEEL_SHAFT, **_WHEEL},
     "a flywheel given by its dimensions, on a shaft of the train",
-    required=("kind", *required_of(_WHEEL)),
+    required=("kind", "diameter"),
 )
 _DIAGRAM: Final = Record(
     {
@@ -147,6 +149,10 @@ def read_drive(node: Node, places: dict[str, str]) -> dict[str, Any] | None:
 def _read_flywheel(node: Node, stages: int) -> dict[str, Any]:
     """Read the shape of a flywheel, and its shaft where that is not the main shaft; None as shape with a fault."""
     shape = FLYWHEEL.read(node) if _FLYWHEEL.read(node) else None
+    if shape is not None:
+        numbers = numbers_of({"drive": {"flywheel": shape}}, "drive.flywheel.")
+        fields = ("kind", FLYWHEEL_SHAFT.name, *numbers)
+        refuse_foreign(node, fields, Sentence("a flywheel of the kind {kind}", kind=str(shape)))
     own = node[FLYWHEEL_SHAFT.name]
     shaft = FLYWHEEL_SHAFT.read(node) if shape is not None and own.value is not None else None
     if not own.sound:

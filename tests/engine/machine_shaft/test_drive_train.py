@@ -240,3 +240,36 @@ def test_one_blow_in_sixty_revolutions_in_closed_form() -> None:
     assert got["drive_torque.mean"] == pytest.approx(5.0, rel=1e-12)
     assert got["energy.fluctuation"] == pytest.approx(600.0 * math.pi * (1.0 - 1.0 / 120.0), rel=1e-12)
     assert got["irregularity"] == pytest.approx(got["energy.fluctuation"] / (50.0 * 100.0), rel=1e-12)
+
+
+def test_a_ring_has_the_inertia_and_the_stress_of_its_section() -> None:
+    """Mass and inertia by a quadrature over the radius, the stress in its limits: a thin rim, and a disc with a hole.
+
+    A small hole in the middle of a disc doubles its stress (S. P. Timoshenko, J. N. Goodier, *Theory of Elasticity*,
+    section 32).
+    """
+    drive = Drive(stages=("gear",), flywheel="ring", flywheel_shaft=0)
+    spec = replace(PRESS, drive=drive)
+    numbers = PRESS_NUMBERS | {
+        "drive.stages.0.ratio": 5.0, "drive.flywheel.diameter": 0.6, "drive.flywheel.width": 0.08,
+        "drive.flywheel.thickness": 0.05, "drive.flywheel.density": 7200.0, "wanted_irregularity": 0.03,
+    }  # fmt: skip
+    got = one(spec, numbers)
+    own = quad(lambda r: 7200.0 * 0.08 * math.tau * r * r**2, 0.275, 0.325, epsabs=0.0)[0]
+    assert got["flywheel.inertia"] == pytest.approx(own, rel=1e-12)
+    assert got["inertia.drive"] == pytest.approx(15.0 + 25.0 * own, rel=1e-12)
+    assert got["flywheel.speed"] == pytest.approx(0.3 * 5.0 * got["omega.max"], rel=1e-13)
+    mass = 7200.0 * math.pi * 0.6 * 0.08 * 0.05
+    wider = {"drive.flywheel.width": 0.08 * got["flywheel.required_mass"] / mass}
+    for change in (wider, {"drive.flywheel.diameter": got["flywheel.required_diameter"]}):
+        assert one(spec, numbers | change)["irregularity"] == pytest.approx(0.03, rel=1e-9)
+
+    def stress(thickness: float) -> float:
+        thin = one(spec, numbers | {"drive.flywheel.thickness": thickness})
+        return thin["flywheel.stress"] / (7200.0 * thin["flywheel.speed"] ** 2)
+
+    assert stress(1e-9) == pytest.approx(1.0, abs=1e-8)
+    assert stress(0.6) == pytest.approx(2.0 * (3.0 + 0.3) / 8.0 * 2.0**2, rel=1e-13)
+    with pytest.raises(RelationError) as error:
+        check(spec, numbers | {"drive.flywheel.thickness": 0.7})
+    assert error.value.path == "drive.flywheel.thickness"

@@ -107,12 +107,18 @@ _DRIVE: Final = FormChoice(
     ),
 )  # fmt: skip
 _ON_SHAFT: Final = FormField("drive/flywheel/shaft", label="Shaft", default="main shaft", example="0")
+_MATERIAL: Final = ("density", "poisson_ratio", "allowed_stress")
+_FLYWHEELS: Final = {
+    "rim": ("", ("mass",)), "disc": ("", ("mass",)),
+    "ring": ("a rim by its width and thickness", ("width", "thickness")),
+}  # fmt: skip
 _FLYWHEEL: Final = FormChoice(
     "drive/flywheel", "Flywheel", help="by its dimensions",
     options=(
         Option("none", "none"),
-        *(Option(kind, "", (FormField("drive/flywheel/*"), _ON_SHAFT), at="drive/flywheel", is_kind=True)
-          for kind in ("rim", "disc")),
+        *(Option(kind, label, (*_fields("drive/flywheel", "diameter", *size, *_MATERIAL), _ON_SHAFT),
+                 at="drive/flywheel", is_kind=True)
+          for kind, (label, size) in _FLYWHEELS.items()),
     ),
 )  # fmt: skip
 _MECHANISM: Final = FormChoice(
@@ -216,7 +222,7 @@ FORM: Final = Form(
     with_loads=True,
     front=(
         "mean_speed", "wanted_irregularity", "drive", r"drive\.(inertia|torque(\.\w+)?|flywheel)",
-        r"drive\.motor\.(?!inertia).*", r"drive\.flywheel\.(mass|diameter|shaft)",
+        r"drive\.motor\.(?!inertia).*", r"drive\.flywheel\.(mass|diameter|width|thickness|shaft)",
         r"drive\.stages\.N\.(kind|ratio|lead|radius)", r"(parts\.N\.)?(mechanism|operation|crank_angle)",
         r"(parts\.N\.)?mechanism\.\w+\.(?!(kind|bodies|weights|rise|fall|inclination|.*_(centre|inertia|angle))$).*",
         r"(parts\.N\.)?mechanism\.(formula|csv|cam\.\w+_angle|linkage\.(elements|working))",

@@ -21,6 +21,7 @@ from sprag_study.engine.machine_shaft.spec import (
     LINKED,
     REVOLUTIONS,
     Drive,
+    Flywheel,
     MachineSpec,
     MechanismChoice,
     MechanismKind,
@@ -78,7 +79,7 @@ def catalogue() -> tuple[Parameter, ...]:
     every: list[MachineSpec] = [MachineSpec(cycle=max(REVOLUTIONS), constants=("NAME",))]
     every += [MachineSpec(drive=Drive("formula")), MachineSpec(balance="motor", drive=Drive(motor="linear"))]
     every += [MachineSpec(balance="motor", drive=Drive(motor=motor)) for motor in ("kloss", "table")]
-    every += [MachineSpec(drive=Drive(flywheel="rim"))]
+    every += [MachineSpec(drive=Drive(flywheel=shape)) for shape in get_args(Flywheel)]
     every += [MachineSpec(drive=Drive(stages=(stage,))) for stage in get_args(Stage)]
     every += [MachineSpec(mechanism=MechanismChoice(kind)) for kind in kinds]
     every += [MachineSpec(mechanism=MechanismChoice("four_bar", weights="all"))]

@@ -21,6 +21,8 @@ CAPTIONS: Final[dict[str, str]] = {
     "drive.motor.scale": "Factor on the motor's torque",
     "drive.flywheel.diameter": "Diameter of the flywheel",
     "drive.flywheel.mass": "Mass of the flywheel",
+    "drive.flywheel.width": "Width of the flywheel's rim",
+    "drive.flywheel.thickness": "Thickness of the flywheel's rim",
     "drive.flywheel.density": "Density of the flywheel",
     "drive.flywheel.poisson_ratio": "Poisson's ratio of the flywheel",
     "drive.flywheel.allowed_stress": "Allowed stress of the flywheel",

@@ -44,6 +44,13 @@ def test_choices_that_a_machine_uses_survive_the_form() -> None:
     assert parse_spec(spec_of(values_of(spec))[0]).study == parse_spec(spec).study
 
 
+def test_a_ring_goes_through_the_form() -> None:
+    ring = {"kind": "ring", "diameter": "1.2 m", "width": "90 mm", "thickness": "45 mm", "allowed_stress": "40 MPa"}
+    spec = {"sprag": 1, "model": "machine-shaft", "name": "ring", "axes": []}
+    spec["base"] = PRESS["base"] | {"drive": {"inertia": 1, "flywheel": ring}}
+    assert parse_spec(spec_of(values_of(spec))[0]).study == parse_spec(spec).study
+
+
 def test_the_shaft_of_a_part_goes_through_the_form() -> None:
     spec = preset_of("two_cylinder_compressor")["spec"]
     first, second = spec["base"]["parts"]

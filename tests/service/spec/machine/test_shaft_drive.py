@@ -85,9 +85,26 @@ def test_a_flywheel_is_given_by_its_dimensions() -> None:
     jsonschema.Draft202012Validator(spec_schema()).validate(spec)
     chosen = {choice.path: choice.text for choice in part_of("machine-shaft").choices(study, spec)}
     assert chosen["drive.flywheel.kind"] == "rim"
-    found = problems({"/base/drive": {"flywheel": {"kind": "ring", "mass": 3}}, "/axes": []})
+    found = problems({"/base/drive": {"flywheel": {"kind": "plate", "mass": 3}}, "/axes": []})
     assert found["/base/drive/flywheel/kind"].code == "invalid-choice"
     assert "/base/drive/flywheel/diameter" in problems({"/base/drive": {"flywheel": {"kind": "disc"}}, "/axes": []})
+
+
+def test_a_ring_has_a_width_and_a_thickness_instead_of_a_mass() -> None:
+    ring = {"kind": "ring", "diameter": "0.8 m", "width": "90 mm", "thickness": "45 mm", "density": "7.25 g/cm^3"}
+    spec = changed({"/base/drive": {"flywheel": ring}, "/axes": []})
+    jsonschema.Draft202012Validator(spec_schema()).validate(spec)
+    study = parse_spec(spec).study
+    assert study.base["drive.flywheel.thickness"] == 0.045
+    assert "drive.flywheel.mass" not in study.base
+    for wheel, place, code in (
+        (ring | {"mass": 3}, "mass", "unknown-field"),
+        ({"kind": "rim", "diameter": 1, "mass": 3, "width": 1}, "width", "unknown-field"),
+        ({"kind": "ring", "diameter": 1, "width": 0.1}, "thickness", "required"),
+        (ring | {"thickness": "900 mm"}, "thickness", "conflict"),
+    ):
+        found = problems({"/base/drive": {"flywheel": wheel}, "/axes": []})
+        assert found[f"/base/drive/flywheel/{place}"].code == code
 
 
 def test_a_flywheel_sits_on_a_shaft_of_the_train() -> None:
