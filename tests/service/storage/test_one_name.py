@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 from threading import Thread
 
@@ -21,37 +21,65 @@ from tests.conftest import ROOT
 from tests.faults import refused
 from tests.worker import fakes
 
-#: Opens a database and keeps it open until its input ends; prints why where it may not.
+#: Opens the database of each line and keeps it open until an empty one; prints why where it may not.
 HOLDER = """
 import sys
+from contextlib import suppress
 from sprag_study.service.storage.errors import DatabaseError
 from sprag_study.service.storage.store import Store
-try:
-    with Store.open(f"sqlite:///{sys.argv[1]}"):
-        print("open", flush=True)
-        sys.stdin.read()
-except DatabaseError as error:
-    print(error.code, flush=True)
-"""
-
-
-@contextmanager
-def held(path: Path) -> Iterator[str]:
-    """What another process says that opens the database and keeps it open."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    with subprocess.Popen(
-        [sys.executable, "-c", HOLDER, str(path)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-        env=environment,
-        cwd=ROOT,
-    ) as process:
-        assert process.stdout is not None
+store = None
+for line in sys.stdin:
+    if path := line.strip():
         try:
-            yield process.stdout.readline().strip()
-        finally:
-            process.communicate()
+            store = Store.open(f"sqlite:///{path}")
+            print("open", flush=True)
+        except DatabaseError as error:
+            print(error.code, flush=True)
+    else:
+        if store is not None:
+            with suppress(DatabaseError):
+                store.close()
+        store = None
+        print("closed", flush=True)
+"""
+#: What opens a database in another process and says how that went, until the block is left.
+Held = Callable[[Path], AbstractContextManager[str]]
+
+
+@pytest.fixture(scope="module")
+def held() -> Iterator[Held]:
+    """Opens databases in as many other processes as are open at the same time."""
+    idle: list[subprocess.Popen[str]] = []
+    with ExitStack() as stack:
+
+        def started() -> subprocess.Popen[str]:
+            process = stack.enter_context(
+                subprocess.Popen(
+                    [sys.executable, "-c", HOLDER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+                    env={**os.environ, "PYTHONPATH": str(ROOT)}, cwd=ROOT,
+                )
+            )  # fmt: skip
+            stack.callback(process.communicate)
+            return process
+
+        @contextmanager
+        def opened(path: Path) -> Iterator[str]:
+            process = idle.pop() if idle else started()
+            try:
+                yield _answer(process, str(path))
+            finally:
+                assert _answer(process, "") == "closed"
+                idle.append(process)
+
+        yield opened
+
+
+def _answer(process: subprocess.Popen[str], line: str) -> str:
+    assert process.stdin is not None
+    assert process.stdout is not None
+    process.stdin.write(f"{line}\n")
+    process.stdin.flush()
+    return process.stdout.readline().strip()
 
 
 @pytest.fixture
@@ -79,7 +107,7 @@ def test_a_link_that_is_made_while_the_file_is_used_is_told(file: Path, tmp_path
         assert "has 2 names (hard links)" in Readiness(store).warnings()[0]
 
 
-def test_symbolic_links_of_file_and_folder_are_followed(file: Path, tmp_path: Path) -> None:
+def test_symbolic_links_of_file_and_folder_are_followed(held: Held, file: Path, tmp_path: Path) -> None:
     (tmp_path / "link").symlink_to(file)
     (tmp_path / "places").symlink_to(file.parent)
     for name in (tmp_path / "link", tmp_path / "places" / file.name):
@@ -105,7 +133,7 @@ def test_a_link_that_is_turned_to_another_file_is_noticed(file: Path, tmp_path: 
 
 
 def test_a_file_that_was_moved_while_a_process_uses_it_is_refused_under_the_new_name(
-    file: Path, tmp_path: Path
+    held: Held, file: Path, tmp_path: Path
 ) -> None:
     moved = tmp_path / "moved.sqlite3"
     with held(file) as said:
@@ -117,12 +145,14 @@ def test_a_file_that_was_moved_while_a_process_uses_it_is_refused_under_the_new_
     Store.open(f"sqlite:///{moved}").close()
 
 
-def test_processes_of_one_name_work_beside_each_other(file: Path) -> None:
+def test_processes_of_one_name_work_beside_each_other(held: Held, file: Path) -> None:
     with held(file) as first, held(file) as second, Store.open(f"sqlite:///{file}"):
         assert (first, second) == ("open", "open")
 
 
-def test_a_session_that_ends_leaves_the_locks_of_another_one_of_its_process_alone(file: Path, tmp_path: Path) -> None:
+def test_a_session_that_ends_leaves_the_locks_of_another_one_of_its_process_alone(
+    held: Held, file: Path, tmp_path: Path
+) -> None:
     """Closing a descriptor of the file would drop SQLite's locks: another process could delete the log in use."""
     with Store.open(f"sqlite:///{file}") as store:
         Store.open(f"sqlite:///{file}").close()
@@ -187,12 +217,12 @@ def test_a_session_that_ends_while_another_begins_waits_for_nothing(
         return place_of(path)
 
     monkeypatch.setattr(one_name, "_place_of", collect)
-    held: list[one_name.HeldName | None] = []
-    thread = Thread(target=lambda: held.append(one_name.hold(file)), daemon=True)
+    begun: list[one_name.HeldName | None] = []
+    thread = Thread(target=lambda: begun.append(one_name.hold(file)), daemon=True)
     thread.start()
     thread.join(SECONDS)
     assert not thread.is_alive()
-    (name,) = held
+    (name,) = begun
     assert name is not None
     status = file.stat()
     assert one_name._OPENED[status.st_dev, status.st_ino].sessions == 1
