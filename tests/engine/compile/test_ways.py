@@ -29,12 +29,12 @@ from sprag_study.engine.vibration_drive.equations import series_loop
 from sprag_study.engine.vibration_drive.layout import as_record, make_layout
 from tests.engine.taylor.polynomials import first_root, largest
 
-LAYOUT = make_layout(1, 2, 3, 8)
+LAYOUT = make_layout(1, 4, 6, 8)
 fixed, workspace = constant_record(as_record(LAYOUT)), constant_shape(LAYOUT.rows, 8)
 step = lane_loops(series_loop(LAYOUT) + "\\n" + bounds_loop(LAYOUT), "tolerance", "log2_tolerance")
 advance = lane_loops(advance_loop(LAYOUT), "unused", "unused_too")
-find_roots = lane_loops(roots_loop(3), "unused", "unused_too")
-find_peaks = lane_loops(peaks_loop(3), "unused", "unused_too")
+find_roots = lane_loops(roots_loop(6), "unused", "unused_too")
+find_peaks = lane_loops(peaks_loop(6), "unused", "unused_too")
 exceeding = lane_mask(">", LAYOUT.excess, 8)
 
 @numba.njit(error_model="numpy")
@@ -50,12 +50,12 @@ def run(lay, W, blocks):
 rng = np.random.default_rng(1)
 found = []
 for _ in range(50):
-    W, blocks = aligned_zeros(LAYOUT.rows * 8).reshape(LAYOUT.rows, 8), aligned_zeros(SLOTS * (3 + ROWS))
+    W, blocks = aligned_zeros(LAYOUT.rows * 8).reshape(LAYOUT.rows, 8), aligned_zeros(SLOTS * (6 + ROWS))
     W[:], blocks[:] = rng.uniform(0.01, 1.0, W.shape), rng.normal(size=blocks.shape)
     found += [np.array([run(as_record(LAYOUT), W, blocks)], dtype=float), W.ravel(), blocks]
-    g = rng.normal(size=4)
+    g = rng.normal(size=7)
     g[0] = abs(g[0])
-    found.append(np.array([first_root(g, 3, work_stack()), largest(g, 3, 0.1, work_stack())]))
+    found.append(np.array([first_root(g, 6, work_stack()), largest(g, 6, 0.1, work_stack())]))
 inside = [name for name in ("decorators", "lowering", "program") if f"sprag_study.engine.compile.{name}" in sys.modules]
 values = np.concatenate(found)
 values[np.isnan(values)] = 7.0  # which NaN it is has no meaning
