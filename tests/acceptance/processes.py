@@ -30,11 +30,13 @@ __all__ = [
 EXAMPLES = ROOT / "examples"
 #: Generous: the machine may be busy with other tests.
 SECONDS = 600
-#: A process that was started in the background may have been told to ignore interrupts; this one is not.
+#: A process that was started in the background may have been told to ignore interrupts, or that its terminal is gone; this
+#: one is not.
 INTERRUPTIBLE = (
     sys.executable,
     "-c",
     "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    "signal.signal(signal.SIGHUP, signal.SIG_DFL); "
     "from sprag_study.service.cli import main; main()",
 )
 
