@@ -30,7 +30,7 @@ __all__ = [
 EXAMPLES = ROOT / "examples"
 #: Generous: the machine may be busy with other tests.
 SECONDS = 600
-#: A process that was started in the background may have been told to ignore interrupts, or that its terminal is gone; this
+#: A process that was started in the background may have been told to ignore interrupts and hangups; this
 #: one is not.
 INTERRUPTIBLE = (
     sys.executable,
