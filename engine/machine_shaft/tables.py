@@ -140,7 +140,11 @@ def periodic(table: Table, period: float) -> Curve:
     excess = x[-1] - x[0] - period
     if excess > 1e-9 * period:
         covered, most = (amount(math.degrees(angle), "deg") for angle in (x[-1] - x[0], period))
-        message = Sentence("The table covers {covered}, more than its cycle of {most}.", covered=covered, most=most)
+        message = Sentence(
+            "The table covers {covered}, more than its cycle of {most}; angles without a unit are in rad.",
+            covered=covered,
+            most=most,
+        )
         raise TableError(message, covered, Sentence("at most {high}", high=most))
     if abs(excess) <= 1e-9 * period:
         gap = abs(y[-1] - y[0])

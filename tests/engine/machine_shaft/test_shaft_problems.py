@@ -134,7 +134,7 @@ def test_other_base_errors() -> None:
 def test_structures_that_make_no_machine() -> None:
     open_table = Table(((0.0, 1.0), (2.0 * math.pi, 2.0)))
     wrong = [
-        (replace(PRESS, cycle=13), StructureError), (replace(PRESS, balance="motor"), StructureError),
+        (replace(PRESS, cycle=61), StructureError), (replace(PRESS, balance="motor"), StructureError),
         (replace(PRESS, phi_c=-1), StructureError), (replace(PRESS, constants=("sin",)), StructureError),
         (replace(PRESS, mechanism=MechanismChoice("formula", formula="1")), StructureError),
         (MachineSpec(mechanism=MechanismChoice("table")), StructureError),

@@ -96,7 +96,7 @@ def test_tokens_are_created_and_revoked_by_the_service_as_in_its_database(
     for run, token in zip((asked, sprag), created, strict=True):
         gone = run("admin", "token", "revoke", token.id, "--yes", "--json")
         assert (gone.code, gone.data["state"], gone.data["id"]) == (0, "revoked", token.id), gone.err
-        unknown = run("admin", "token", "revoke", "tk_0", "--json")
+        unknown = run("admin", "token", "revoke", "tk_none", "--json")
         assert (unknown.code, '"code": "token-not-found"' in unknown.err) == (2, True), unknown.err
         wrong = run("admin", "token", "create", "--name", " ", "--json")
         assert (wrong.code, json.loads(wrong.err)["problems"][0]["parameter"]) == (2, "--name")

@@ -43,7 +43,7 @@ def test_tokens_are_created_listed_and_revoked(settings: Settings, capsys: pytes
     assert record.id in run("list", *db)[1]
     assert run("revoke", record.id, *db)[0] == 0
     assert json.loads(run("list", "--json", *db)[1])["tokens"][0]["revoked_at"].startswith("20")
-    code, _, err = run("revoke", "tk_0", "--json", *db)
+    code, _, err = run("revoke", "tk_none", "--json", *db)
     assert (code, json.loads(err)["code"]) == (2, "token-not-found")
     for name in ("", "  ", "a\x1b[2Jb", "a\nb", "x" * 201):
         code, out, err = run("create", "--name", name, *db)

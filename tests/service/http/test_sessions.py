@@ -93,7 +93,7 @@ def test_a_revoked_token_is_worthless_and_the_service_stays_shut(
     assert client.get("/api/v1/studies").status_code == 401
     assert browser.get("/").status_code == 303
     with pytest.raises(TokenNotFoundError):
-        office.store.people.revoke_token("tk_0")
+        office.store.people.revoke_token("tk_none")
 
 
 def test_whoever_has_a_token_is_told_why_it_lets_nobody_in(office: Office, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -99,6 +99,8 @@ def test_a_fraction_in_percent_and_texts_without_rows() -> None:
     ):
         assert problems(found(csv=wrong))["/base/operation/indicator/csv"].message == sentence
     (fault,) = problems(found(csv="a,p [bar]\n0,1\n180,2\n", over="angle")).values()
+    assert fault.message.endswith("angles without a unit are in rad.")
+    (fault,) = problems(found(csv="a,p [bar]\n0,1\n720,2\n", over="angle")).values()
     assert fault.message.endswith("without a unit in the heading it is in rad")
 
 
