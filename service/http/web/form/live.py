@@ -55,7 +55,7 @@ _VALUES: Final = 25
 #: Seconds between two looks whether checks are possible.
 _LOOK: Final = 0.5
 #: Seconds of a service without a page before it computes the first machines all the same.
-_UNVISITED_SECONDS: Final = 60.0
+_UNVISITED_SECONDS: Final = 20.0
 #: Width of the picture (px), unless the page says another.
 _WIDTH: Final = 560
 
