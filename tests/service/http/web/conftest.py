@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 from urllib.parse import urlsplit
 
 import httpx
@@ -93,6 +93,8 @@ def chromium() -> str:
     return found
 
 
+#: Drawings that move take a whole core while a test waits for something else.
+STILL: Final[dict[str, Any]] = {"reduced_motion": "reduce"}
 _BROWSER = pytest.StashKey[tuple[ExitStack, Browser]]()
 
 
@@ -154,7 +156,9 @@ def visit(page: Page, address: str) -> Iterator[Visitor]:
 @pytest.fixture
 def visitor(browser: Browser, office: Office, request: pytest.FixtureRequest) -> Iterator[Visitor]:
     """A visit at desktop width, or with the options that the test names."""
-    options = {"viewport": {"width": 1280, "height": 900}, "accept_downloads": True, **getattr(request, "param", {})}
+    options = {
+        "viewport": {"width": 1280, "height": 900}, "accept_downloads": True, **STILL, **getattr(request, "param", {}),
+    }  # fmt: skip
     context = browser.new_context(base_url=office.address, **options)
     context.set_default_timeout(1000 * SECONDS)
     with visit(context.new_page(), office.address) as found:
@@ -182,7 +186,7 @@ def open_tab(service: Service, browser: Browser) -> Iterator[Callable[..., Page]
     with online(service) as address, ExitStack() as contexts:
 
         def opened(**options: Any) -> Page:
-            context = contexts.enter_context(browser.new_context(base_url=address, **options))
+            context = contexts.enter_context(browser.new_context(base_url=address, **STILL, **options))
             context.set_default_timeout(1000 * SECONDS)
             return context.new_page()
 

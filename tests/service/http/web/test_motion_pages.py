@@ -95,6 +95,7 @@ def test_a_basin_is_chosen_by_keyboard_without_scripts(visitor: Visitor, motions
     expect(page.get_by_role("region", name="Regimes", exact=True)).to_contain_text("periodic")
 
 
+@pytest.mark.parametrize("visitor", [{"reduced_motion": "no-preference"}], indirect=True)
 def test_the_drawing_moves_by_the_slider(visitor: Visitor, motions: str) -> None:
     page = visitor.page
     page.goto(f"/studies/{motions}/cases/0?wait=1")
@@ -125,7 +126,7 @@ def test_a_case_shows_its_numbers_in_its_drawing_and_two_charts_at_once(visitor:
 def test_the_lines_from_numbers_follow_the_drawing(visitor: Visitor, motions: str) -> None:
     page = visitor.page
     page.goto(f"/studies/{motions}/cases/0?wait=1")
-    page.get_by_role("button", name="Pause").click()
+    expect(page.get_by_role("button", name="Play")).to_be_visible()
     line, slider = page.locator('.leader[data-on="arm"]').first, page.locator("#instant")
     places = set()
     for part in (0, 0.1, 0.2):

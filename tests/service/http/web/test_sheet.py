@@ -343,7 +343,6 @@ def test_the_whole_task_by_keys_alone(visitor: Visitor, office: Office) -> None:
 
 def test_the_machine_moves_while_it_is_drawn(visitor: Visitor) -> None:
     page = visitor.page
-    page.emulate_media(reduced_motion="reduce")
     page.goto("/new")
     speed = page.locator('[data-result="shaft.speed.mean"]')
     expect(speed).to_be_visible()
