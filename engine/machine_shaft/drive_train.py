@@ -48,22 +48,23 @@ class Train:
     @classmethod
     def of(cls, drive: Drive, values: Mapping[str, Floats]) -> "Train":
         """The train of ``drive`` with the ``values`` by path."""
-        inertia, ratio, efficiency = values["drive.inertia"], np.ones((1, 1, 1)), np.ones((1, 1, 1))
+        inertia, efficiency, ratios = values["drive.inertia"], np.ones((1, 1, 1)), _ratios(drive, values)
         flywheel = None
         if drive.flywheel:
-            flywheel = Flywheel.of(drive.flywheel, values, _ratio_from(drive, values, drive.flywheel_shaft))
+            shaft = len(drive.stages) if drive.flywheel_shaft is None else drive.flywheel_shaft
+            flywheel = Flywheel.of(drive.flywheel, values, ratios[shaft])
             inertia = inertia + flywheel.reduced_inertia
         for index in reversed(range(len(drive.stages))):
             kind, prefix = drive.stages[index], f"drive.stages.{index}."
             own = {path.removeprefix(prefix): value for path, value in values.items() if path.startswith(prefix)}
             if kind not in MOVING:
-                inertia = inertia + own["output_inertia"] * np.square(ratio)
-                ratio, efficiency = ratio * own["ratio"], efficiency * own["efficiency"]
+                inertia = inertia + own["output_inertia"] * np.square(ratios[index + 1])
+                efficiency = efficiency * own["efficiency"]
             way = own["lead"] / (2.0 * math.pi) if kind == "screw_nut" else own.get("radius", 0.0)
-            inertia = inertia + (own["inertia"] + own.get("mass", 0.0) * np.square(way)) * np.square(ratio)
+            inertia = inertia + (own["inertia"] + own.get("mass", 0.0) * np.square(way)) * np.square(ratios[index])
         if "drive.motor.inertia" in values:
-            inertia = inertia + values["drive.motor.inertia"] * np.square(ratio)
-        return cls(inertia, ratio, efficiency, not drive.stages, flywheel)
+            inertia = inertia + values["drive.motor.inertia"] * np.square(ratios[0])
+        return cls(inertia, ratios[0], efficiency, not drive.stages, flywheel)
 
     def motor(self, values: Mapping[str, Floats]) -> dict[str, Floats]:
         """Numbers of a motor as it acts on the main shaft, with the efficiency of the train."""
@@ -105,9 +106,10 @@ class Train:
         return np.asarray(torque * np.where(torque >= 0.0, 1.0 / self.efficiency, self.efficiency) / self.ratio)
 
 
-def _ratio_from(drive: Drive, values: Mapping[str, Floats], shaft: int | None) -> Floats:
-    """Speed of the input shaft of a stage over that of the main shaft, (cases or 1, 1, 1); None is the main shaft."""
-    ratio = np.ones((1, 1, 1))
-    for index in range(len(drive.stages) if shaft is None else shaft, len(drive.stages)):
-        ratio = ratio * values.get(f"drive.stages.{index}.ratio", 1.0)
-    return ratio
+def _ratios(drive: Drive, values: Mapping[str, Floats]) -> list[Floats]:
+    """Speed of each shaft over that of the main shaft, from the motor's to the main shaft, (cases or 1, 1, 1) each."""
+    ratios = [np.ones((1, 1, 1))]
+    for index in reversed(range(len(drive.stages))):
+        moving = drive.stages[index] in MOVING
+        ratios.append(ratios[-1] if moving else ratios[-1] * values[f"drive.stages.{index}.ratio"])
+    return ratios[::-1]
