@@ -305,13 +305,17 @@ class Machine:
         return any(part.follows_speed for part in self.parts)
 
     def speed_law(self, phi: Floats) -> SpeedLaw:
-        """The sum of the torques of the operations that follow the speed, at ``phi`` (cases or 1, panels, nodes)."""
+        """The sum of the torques of the operations that follow the speed, at ``phi`` (cases or 1, panels, nodes).
+
+        Of one case, it takes any number of speeds along the first axis.
+        """
         laws = [part.speed_law(phi) for part in self.parts if part.follows_speed]
         shape = (self.columns.cases, *phi.shape[1:])
 
         def law(omega: Floats) -> tuple[Floats, Floats]:
             torque, slope = (reduce(np.add, same) for same in zip(*(own(omega) for own in laws), strict=True))
-            return np.broadcast_to(torque, shape), np.broadcast_to(slope, shape)
+            whole = np.broadcast_shapes(shape, omega.shape)
+            return np.broadcast_to(torque, whole), np.broadcast_to(slope, whole)
 
         return law
 

@@ -8,13 +8,15 @@ from numpy.polynomial import chebyshev, legendre
 from numpy.typing import NDArray
 
 from sprag_study.engine import elementary
+from sprag_study.engine.endings import ENDINGS, Ending
 from sprag_study.engine.machine_shaft.balance import balanced
 from sprag_study.engine.machine_shaft.columns import Columns
 from sprag_study.engine.machine_shaft.machine import Fields, Machine
 from sprag_study.engine.machine_shaft.motor import characteristic, limit_cycle
 from sprag_study.engine.machine_shaft.operations import SpeedLaw
 from sprag_study.engine.machine_shaft.panels import COEFFICIENTS, NODES, Panels, apply
-from sprag_study.engine.machine_shaft.spec import MachineSpec
+from sprag_study.engine.machine_shaft.simulate import Solved, attempts, settle
+from sprag_study.engine.machine_shaft.spec import MachineSpec, MeanSpeed
 from sprag_study.engine.machine_shaft.speed_course import follows_speed
 from sprag_study.engine.machine_shaft.start import Shape, mean_speed
 from sprag_study.engine.quadrature import product
@@ -65,6 +67,16 @@ class Cycle:
     irregularity: float
 
 
+def cycle_of(panels: Panels, inertia: Floats, start: Floats, work: Floats, kind: MeanSpeed) -> Cycle:
+    """The cycle of an energy ``start`` (1,) at the angle 0 and the ``work`` since then at the nodes."""
+    shape = Shape(panels, float(panels.cuts[0, -1]), inertia, work)
+    mean = float(mean_speed(shape, kind, start)[0][0])
+    square = panels.extremes(shape.squares(start))
+    spread = float(np.sqrt(square.highest[0]) - np.sqrt(max(square.lowest[0], 0.0)))
+    # Of a shaft that turns evenly, rounding errors are left.
+    return Cycle(start[:, None, None] + work, mean, spread / mean if spread > 1e-12 * mean else 0.0)
+
+
 class Bench:
     """A machine with torques and inertia at the nodes of panels, and its steady cycles."""
 
@@ -82,15 +94,29 @@ class Bench:
         self._steady = own.resistance - self.passive
         self._operation = self._steady
         self._law: SpeedLaw | None = None
+        self._factor = 1.0
         if follows_speed(self.machine):
-            law, factor = self.machine.speed_law(panels.angles), 1.0
+            law = self.machine.speed_law(panels.angles)
             if model.balance == "scale" and model.balance_side == "operation":
-                factor = float(own.factor[0])
+                self._factor = float(own.factor[0])
             speeds = np.broadcast_to(self.machine.pace, panels.angles.shape) if omega is None else omega
             # The operations without those that follow the speed.
-            self._operation = self._operation - factor * law(speeds)[0]
-            self._law = scaled(law, factor)
+            self._operation = self._operation - self._factor * law(speeds)[0]
+            self._law = scaled(law, self._factor)
         self.motor = self.machine.train.motor(row.under("drive.motor.")) if model.balance == "motor" else {}
+
+    @property
+    def follows_speed(self) -> bool:
+        """Whether a torque follows the speed."""
+        return bool(self.motor) or self._law is not None
+
+    def fixed(self, load: float) -> Floats:
+        """Torque at the nodes that does not follow the speed, with a factor on the operations."""
+        return self.drive + self.passive + load * self._operation
+
+    def law_at(self, angles: Floats, load: float) -> SpeedLaw | None:
+        """The loads that follow the speed at other angles (1, panels, nodes), with a factor on the operations."""
+        return None if self._law is None else scaled(self.machine.speed_law(angles), load * self._factor)
 
     def resistance(self, load: float, fastest: float = 1.0) -> list[Floats]:
         """Resisting torque at the nodes with a factor on the operations: Chebyshev series over 0 .. ``fastest``.
@@ -129,12 +155,7 @@ class Bench:
         if not np.isfinite(start[0]):
             return None
         work = panels.running(drive + resistance)[0]
-        shape = Shape(panels, self.cycle, inertia, work)
-        mean = float(mean_speed(shape, self.model.mean_speed_is, start)[0][0])
-        square = panels.extremes(shape.squares(start))
-        spread = float(np.sqrt(square.highest[0]) - np.sqrt(max(square.lowest[0], 0.0)))
-        # Of a shaft that turns evenly, rounding errors are left.
-        return Cycle(start[:, None, None] + work, mean, spread / mean if spread > 1e-12 * mean else 0.0)
+        return cycle_of(panels, inertia, start, work, self.model.mean_speed_is)
 
     def fastest(self, *cycles: Cycle | None) -> float:
         """A speed in rad/s above all of a transient: half above the motor without load and the cycles."""
@@ -151,3 +172,39 @@ class Bench:
     def at(self, values: Floats, angles: Floats) -> Floats:
         """Values at angles 0 .. cycle, shape (m,)."""
         return self.panels.at_rows(values, np.zeros(len(angles), dtype=np.int64), self.panels.locate(0, angles))
+
+
+def _speeds(solved: Solved, panels: Panels) -> Floats | None:
+    """Speeds of the case at the nodes of other panels; None where no torque follows the speed."""
+    if solved.omega is None or not np.isfinite(solved.decomposition.start[0]):
+        return None
+    own, angles = solved.decomposition.panels, panels.angles.ravel()
+    found = own.at_rows(solved.omega, np.zeros(len(angles), dtype=np.int64), own.locate(0, angles))
+    return np.ascontiguousarray(found.reshape(panels.angles.shape))
+
+
+def solved_case(model: MachineSpec, row: Columns) -> tuple[Solved | None, Ending]:
+    """The case on panels that resolve it, and its ending; without them where its fields are not resolved."""
+    if not np.isnan(Machine(model, row).unassembled()[0]):
+        return None, Ending.CANNOT_ASSEMBLE
+    with np.errstate(all="ignore"):
+        *_, (_, solved) = attempts(model, row)
+        settle(model, row, solved)
+    ending = ENDINGS[int(solved.endings[0])]
+    if ending in {Ending.NEGATIVE_INERTIA, Ending.QUADRATURE_NOT_REACHED, Ending.NEAR_SINGULAR}:
+        return None, ending
+    return solved, ending
+
+
+def bench_on(model: MachineSpec, row: Columns, solved: Solved, cuts: Floats) -> Bench:
+    """The machine of a solved case on panels with other ``cuts``, (1, panels + 1)."""
+    panels = Panels(cuts)
+    return Bench(model, row, panels, float(solved.decomposition.start[0]), _speeds(solved, panels))
+
+
+def bench_of(model: MachineSpec, row: Columns) -> tuple[Bench | None, Ending]:
+    """The machine on the panels of its case, and the ending of that; without one where there is no drive for it."""
+    solved, ending = solved_case(model, row)
+    if solved is None or (model.balance != "motor" and ending not in {Ending.OK, Ending.UNSTABLE}):
+        return None, ending
+    return bench_on(model, row, solved, np.unique(solved.decomposition.panels.cuts[0])[None, :]), ending

@@ -1,5 +1,6 @@
 """The end of a transient and its cause, as a sentence with its numbers."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -32,6 +33,9 @@ class Ends:
         Share of the first deviation from the steady cycle at which it counts as reached.
     cycle : bool
         Whether there is a steady cycle to come to.
+    missed : float
+        Mean speed in rad/s of a steady cycle to which the shaft does not come, because there is another before it; NaN
+        where there is none.
     no_cycle : str
         Why there is none.
     """
@@ -44,6 +48,7 @@ class Ends:
     turns_back: bool
     within: float
     cycle: bool
+    missed: float
     no_cycle: str
 
 
@@ -57,7 +62,7 @@ def cause_of(kind: str, outcome: str, results: Mapping[str, float], ends: Ends) 
             **lasted,
         )
     if outcome == "reached":
-        return _reached(kind, ends, lasted)
+        return _reached(kind, ends, lasted, results["after.omega.mean"])
     if outcome == "not_reached":
         return _going_on(kind, ends, {**lasted, "speed": _amount(results["omega.end"], "rad/s")})
     if kind == "coasting":
@@ -74,8 +79,14 @@ def _amount(value: float, unit: str = "1") -> Amount:
     return Amount(float(value) + 0.0, unit, 4, form=".4g")
 
 
-def _reached(kind: str, ends: Ends, lasted: Mapping[str, Amount]) -> Sentence:
+def _reached(kind: str, ends: Ends, lasted: Mapping[str, Amount], mean: float) -> Sentence:
     share = _amount(100.0 * ends.within)
+    if math.isfinite(ends.missed):
+        return Sentence(
+            "The shaft comes to the steady cycle at {speed}, and not to the one at {missed}, after {time} and {turns} "
+            "revolutions, to {share} % of the first difference in speed.",
+            speed=_amount(mean, "rad/s"), missed=_amount(ends.missed, "rad/s"), share=share, **lasted,
+        )  # fmt: skip
     if kind == "run-up":
         if ends.within == 0.0:
             return Sentence("The shaft comes to its steady cycle after {time} and {turns} revolutions.", **lasted)

@@ -25,10 +25,12 @@ _FIXED_DRIVE = Sentence("The torque of the drive does not follow the speed, so i
 
 
 class Run:
-    """One transient of a machine on its panels."""
+    """One transient of a machine on its panels; ``missed`` is a steady cycle to which it does not come."""
 
-    def __init__(self, bench: Bench, course: Course, before: Cycle | None, after: Cycle | None) -> None:
-        self.bench, self.course, self.before, self.after = bench, course, before, after
+    def __init__(
+        self, bench: Bench, course: Course, before: Cycle | None, after: Cycle | None, missed: Cycle | None = None
+    ) -> None:
+        self.bench, self.course, self.before, self.after, self.missed = bench, course, before, after, missed
         panels, train = bench.panels, bench.machine.train
         self.cuts = np.ascontiguousarray(panels.cuts[0])
         self.pieces = np.full((1, 6), np.inf)
@@ -155,6 +157,7 @@ class Run:
             turns_back=float(bench.at(bench.passive, angle)[0]) + 2.0 * friction < 0.0,
             within=self.course.within,
             cycle=self.after is not None,
+            missed=np.nan if self.missed is None else self.missed.mean,
             no_cycle=_FIXED_DRIVE if ending is Ending.OK else ending.sentence,
         )
 

@@ -5,14 +5,14 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sprag_study.engine.endings import ENDINGS, Ending
+from sprag_study.engine.endings import Ending
 from sprag_study.engine.machine_shaft import transient_kernel as kernel
 from sprag_study.engine.machine_shaft.columns import Columns
-from sprag_study.engine.machine_shaft.machine import Machine, check_structure
-from sprag_study.engine.machine_shaft.panels import Panels
-from sprag_study.engine.machine_shaft.simulate import Solved, attempts, settle
+from sprag_study.engine.machine_shaft.machine import check_structure
+from sprag_study.engine.machine_shaft.simulate import Solved
 from sprag_study.engine.machine_shaft.spec import MachineSpec
-from sprag_study.engine.machine_shaft.transient_bench import Bench, Cycle
+from sprag_study.engine.machine_shaft.steady_cycles import cycles_on
+from sprag_study.engine.machine_shaft.transient_bench import Bench, Cycle, bench_on, solved_case
 from sprag_study.engine.machine_shaft.transient_causes import ROUGH_LOAD, cause_of
 from sprag_study.engine.machine_shaft.transient_course import COLUMNS, RESULTS, Course, Transient
 from sprag_study.engine.machine_shaft.transient_run import OUTCOMES, Run
@@ -23,33 +23,20 @@ Floats = NDArray[np.float64]
 
 _NAMES, _UNITS = tuple(name for name, _ in COLUMNS), tuple(unit for _, unit in COLUMNS)
 _HALVINGS = 8
+#: Relative difference of mean speeds up to which two cycles are the same.
+_SAME = 1e-6
 
 
-def _speeds(solved: Solved, panels: Panels) -> Floats | None:
-    """Speeds of the case at the nodes of other panels; None where no torque follows the speed."""
-    if solved.omega is None or not np.isfinite(solved.decomposition.start[0]):
-        return None
-    own, angles = solved.decomposition.panels, panels.angles.ravel()
-    found = own.at_rows(solved.omega, np.zeros(len(angles), dtype=np.int64), own.locate(0, angles))
-    return np.ascontiguousarray(found.reshape(panels.angles.shape))
-
-
-def _bench(model: MachineSpec, row: Columns, course: Course) -> tuple[Bench | None, Cycle | None, Ending]:
+def _bench(
+    model: MachineSpec, row: Columns, course: Course
+) -> tuple[Solved | None, Bench | None, Cycle | None, Ending]:
     """The machine on panels that resolve the cycle before and after; without one where a field is not resolved."""
-    if not np.isnan(Machine(model, row).unassembled()[0]):
-        return None, None, Ending.CANNOT_ASSEMBLE
-    with np.errstate(all="ignore"):
-        *_, (_, solved) = attempts(model, row)
-        settle(model, row, solved)
-    ending, d = ENDINGS[int(solved.endings[0])], solved.decomposition
-    if ending in {Ending.NEGATIVE_INERTIA, Ending.QUADRATURE_NOT_REACHED, Ending.NEAR_SINGULAR}:
-        return None, None, ending
-    if ending is not Ending.OK and course.kind != "run-up":
-        return None, None, ending
-    cuts = np.unique(d.panels.cuts[0])[None, :]
+    solved, ending = solved_case(model, row)
+    if solved is None or (ending is not Ending.OK and course.kind != "run-up"):
+        return None, None, None, ending
+    cuts = np.unique(solved.decomposition.panels.cuts[0])[None, :]
     for _ in range(_HALVINGS):
-        panels = Panels(cuts)
-        bench = Bench(model, row, panels, float(d.start[0]), _speeds(solved, panels))
+        bench = bench_on(model, row, solved, cuts)
         after = bench.steady(course.load)
         if after is None:
             break
@@ -57,7 +44,19 @@ def _bench(model: MachineSpec, row: Columns, course: Course) -> tuple[Bench | No
         if not rough.any():
             break
         cuts = np.sort(np.concatenate([cuts, bench.panels.middles(rough)], axis=1), axis=1)
-    return bench, after, ending
+    return solved, bench, after, ending
+
+
+def _led_elsewhere(model: MachineSpec, row: Columns, solved: Solved, run: Run, ending: Ending) -> Run | None:
+    """The run to the steady cycle to which the shaft comes, where that is another than the one it was to come to."""
+    course, bench = run.course, run.bench
+    energy = 0.5 * float(run.state[kernel.ROOT]) ** 2
+    other = cycles_on(bench, ending, course.load).reached_from(course.angle, energy)
+    if other is None or (run.after is not None and abs(other.course.mean / run.after.mean - 1.0) < _SAME):
+        return None
+    bench = bench_on(model, row, solved, other.panels.cuts)
+    before = None if run.before is None else bench.steady(1.0)
+    return Run(bench, course, before, other.course, run.after)
 
 
 def transient(model: MachineSpec, columns: Mapping[str, ArrayLike], course: Course, points: int) -> Transient:
@@ -83,8 +82,8 @@ def transient(model: MachineSpec, columns: Mapping[str, ArrayLike], course: Cour
     if course.kind == "run-up" and model.balance != "motor" and course.torque is None:
         raise ValueError("the run-up of a machine without a motor needs a torque")
     row = Columns.of(model, columns, 1)
-    bench, after, ending = _bench(model, row, course)
-    if bench is None:
+    solved, bench, after, ending = _bench(model, row, course)
+    if solved is None or bench is None:
         return _nothing(ending, Sentence(ending.sentence))
     before = None if course.kind == "run-up" else bench.steady(1.0)
     if course.kind == "coasting" or (not bench.motor and (course.kind == "load-step" or ending is Ending.UNSTABLE)):
@@ -93,6 +92,11 @@ def transient(model: MachineSpec, columns: Mapping[str, ArrayLike], course: Cour
     if not run.loads:
         return _nothing(ending, ROUGH_LOAD)
     status, totals, _ = run.follow(np.empty(0))
+    if OUTCOMES[status] == "not_reached" and bench.motor and course.kind != "coasting":
+        elsewhere = _led_elsewhere(model, row, solved, run, ending)
+        if elsewhere is not None:
+            run = elsewhere
+            status, totals, _ = run.follow(np.empty(0))
     times = np.linspace(0.0, totals[kernel.TIME], points)
     _, _, places = run.follow(times)
     # The end is known without the rounding of the interpolation.

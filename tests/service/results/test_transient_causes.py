@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 from dataclasses import replace
 
@@ -15,9 +16,9 @@ from sprag_study.service.reading.reader import Reading
 
 ENDS = Ends(
     angle=1.25, drive=2.0, largest_drive=3.0, resistance=-2.5, mean_resistance=-1.5, turns_back=True, within=0.05,
-    cycle=True, no_cycle="",
+    cycle=True, missed=math.nan, no_cycle="",
 )  # fmt: skip
-RESULTS = {"duration": 1.8725, "turns": 2.4142, "omega.end": 12.345}
+RESULTS = {"duration": 1.8725, "turns": 2.4142, "omega.end": 12.345, "after.omega.mean": 15.5}
 
 
 @pytest.mark.parametrize(
@@ -40,7 +41,9 @@ def test_each_cause_is_told_in_ukrainian(kind: str, outcome: str) -> None:
 def test_causes_without_numbers_are_told_in_ukrainian() -> None:
     no_cycle = cause_of("run-up", "not_reached", RESULTS, replace(ENDS, cycle=False, no_cycle=_FIXED_DRIVE))
     assert _FIXED_DRIVE in no_cycle
-    for english in (ROUGH_LOAD, no_cycle):
+    elsewhere = cause_of("run-up", "reached", RESULTS, replace(ENDS, missed=132.9))
+    assert "at 15.5 rad/s, and not to the one at 132.9 rad/s" in elsewhere
+    for english in (ROUGH_LOAD, no_cycle, elsewhere):
         with language("uk"):
             told = Reading("machine-shaft").say(english)
         assert not any(word in told for word in ("shaft", "torque", "The ")), told
