@@ -226,6 +226,25 @@ def solve_two(matrix: Floats, right: Floats) -> None:
 
 
 @compiled
+def newton_steps(matrix: Floats, slope: Floats, left: Floats, out: Floats) -> None:
+    """Newton's step of ``T = T_0 + matrix M(T)`` for each row, from its ``slope`` dM/dT and what is ``left`` of it.
+
+    These and ``out``, which is written, have the shape (n, nodes).
+    """
+    nodes = len(matrix)
+    jacobian, right = np.empty((nodes, nodes)), np.empty((nodes, 2))
+    for n in range(len(slope)):
+        for i in range(nodes):
+            for j in range(nodes):
+                jacobian[i, j] = -matrix[i, j] * slope[n, j]
+            jacobian[i, i] += 1.0
+            right[i, 0], right[i, 1] = left[n, i], 0.0
+        solve_two(jacobian, right)
+        for i in range(nodes):
+            out[n, i] = right[i, 0]
+
+
+@compiled
 def periodic_linear(
     slope: Floats, source: Floats, half: Floats, running: Floats, weights: Floats, energy: Floats, start: Floats
 ) -> None:

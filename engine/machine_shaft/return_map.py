@@ -12,9 +12,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from sprag_study.engine import elementary
+from sprag_study.engine.machine_shaft import kernels
 from sprag_study.engine.machine_shaft.motor import characteristic, motor_torque
 from sprag_study.engine.machine_shaft.operations import SpeedLaw
-from sprag_study.engine.machine_shaft.panels import POSITIONS, RUNNING, TAIL, WEIGHTS
+from sprag_study.engine.machine_shaft.panels import POSITIONS, RUNNING, TAIL, WEIGHTS, apply
 from sprag_study.engine.machine_shaft.transient_bench import Bench
 
 Floats = NDArray[np.float64]
@@ -103,20 +105,21 @@ class ReturnMap:
     def _collocated(self, piece: _Piece, begin: Floats, backward: bool) -> tuple[Floats, Floats, Floats, Floats]:
         """Energies at the nodes, that at the other end, its derivative by ``begin``, and the error; inf if none."""
         matrix = piece.half * (RUNNING - WEIGHTS if backward else RUNNING)
-        weights = (-piece.half if backward else piece.half) * WEIGHTS
+        weights = (-piece.half if backward else piece.half) * WEIGHTS[None, :]
         count = len(begin)
         energy = np.repeat(begin[:, None], len(WEIGHTS), axis=1)
         done, active = np.zeros(count, dtype=np.bool_), np.arange(count)
         for _ in range(_ITERATIONS):
             own = energy[active]
             torque, slope = self.torque(piece, own)
-            left = begin[active, None] + torque @ matrix.T - own
+            left = begin[active, None] + apply(matrix, torque) - own
             known = np.isfinite(left).all(axis=1) & np.isfinite(slope).all(axis=1)
             active, own, left, slope = active[known], own[known], left[known], slope[known]
             if not active.size:
                 break
-            jacobian = np.eye(len(WEIGHTS)) - matrix * slope[:, None, :]
-            following = own + np.linalg.solve(jacobian, left[:, :, None])[:, :, 0]
+            step = np.empty(own.shape)
+            kernels.newton_steps(matrix, np.ascontiguousarray(slope), np.ascontiguousarray(left), step)
+            following = own + step
             # The torques of energies below 0 are not known.
             following = np.maximum(following, 1e-3 * own)
             moved = np.abs(following - own).max(axis=1) / np.abs(following).max(axis=1)
@@ -126,12 +129,12 @@ class ReturnMap:
             if not active.size:
                 break
         torque, slope = self.torque(piece, energy)
-        error = np.abs(torque @ (piece.half * TAIL).T).sum(axis=1) / energy.max(axis=1)
-        residue = np.abs(begin[:, None] + torque @ matrix.T - energy).max(axis=1) / energy.max(axis=1)
-        end = begin + torque @ weights
+        error = np.abs(apply(piece.half * TAIL, torque)).sum(axis=1) / energy.max(axis=1)
+        residue = np.abs(begin[:, None] + apply(matrix, torque) - energy).max(axis=1) / energy.max(axis=1)
+        end = begin + apply(weights, torque)[:, 0]
         sound = (done | (residue < 1e-12)) & (end > 0.0) & np.isfinite(end)
         error = np.where(sound, np.maximum(error, np.where(residue < 1e-11, 0.0, residue)), np.inf)
-        growth = np.exp(slope @ weights)
+        growth = elementary.exp(apply(weights, slope)[:, 0])
         return energy, end, growth, error
 
     def _stops(self, piece: _Piece, begin: Floats, backward: bool) -> Bools:

@@ -74,7 +74,8 @@ class SteadyCycles:
     case : int or None
         Which of them the results of the case are about.
     stops_below : float
-        Speed in rad/s at the angle 0 up to which the shaft comes to a standstill; 0 where it never does.
+        Speed in rad/s at the angle 0 up to which the shaft comes to a standstill, at most the fastest of ``speeds``; 0
+        where it never does.
     runs_away_above : float
         Speed from which it becomes faster and faster; infinite where it does not.
     speeds, changes : arrays, shape (n,)
@@ -278,13 +279,13 @@ def cycles_on(bench: Bench, ending: Ending, load: float = 1.0) -> SteadyCycles:
     if np.isfinite(bench.start) and load == 1.0 and energies.size:
         nearest = int(np.argmin(np.abs(energies - bench.start)))
         case = nearest if abs(energies[nearest] - bench.start) <= _SAME * bench.start else None
-    stops = 0.0 if rises[0] else float(min(bounds, default=np.inf))
+    stops = 0.0 if rises[0] else float(min(bounds, default=root[-1]))
     away = float(max(bounds, default=0.0)) if rises[-1] else np.inf
     after = np.sqrt(2.0 * (scan.energy + scan.change) / inertia)
     return SteadyCycles(tuple(cycles), case, stops, away, root, after - root, whole, ending)
 
 
-def steady_cycles(model: MachineSpec, columns: Mapping[str, ArrayLike]) -> SteadyCycles | None:
+def steady_cycles(model: MachineSpec, columns: Mapping[str, ArrayLike], load: float = 1.0) -> SteadyCycles | None:
     """Every steady cycle of one case; None where its torques do not follow the speed.
 
     Without a motor the drive is the one that balances the case. Where it has none, there are no cycles.
@@ -294,6 +295,8 @@ def steady_cycles(model: MachineSpec, columns: Mapping[str, ArrayLike]) -> Stead
     model : MachineSpec
     columns : mapping
         As for ``simulate``, scalars only.
+    load : float
+        Factor on the torque of all operations.
 
     Raises
     ------
@@ -307,4 +310,4 @@ def steady_cycles(model: MachineSpec, columns: Mapping[str, ArrayLike]) -> Stead
     none = np.empty(0)
     if bench is None:
         return SteadyCycles((), None, 0.0, np.inf, none, none, True, ending)
-    return cycles_on(bench, ending) if bench.follows_speed else None
+    return cycles_on(bench, ending, load) if bench.follows_speed else None

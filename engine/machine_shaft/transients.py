@@ -50,7 +50,7 @@ def _bench(
 def _led_elsewhere(model: MachineSpec, row: Columns, solved: Solved, run: Run, ending: Ending) -> Run | None:
     """The run to the steady cycle to which the shaft comes, where that is another than the one it was to come to."""
     course, bench = run.course, run.bench
-    energy = 0.5 * float(run.state[kernel.ROOT]) ** 2
+    energy = 0.5 * float(np.square(run.state[kernel.ROOT]))
     other = cycles_on(bench, ending, course.load).reached_from(course.angle, energy)
     if other is None or (run.after is not None and abs(other.course.mean / run.after.mean - 1.0) < _SAME):
         return None

@@ -23,7 +23,7 @@ from sprag_study.service.spec.document import format_of, load_spec
 from sprag_study.service.storage.studies.records import CaseRow
 from sprag_study.worker import models
 from sprag_study.worker.codes import PENDING
-from sprag_study.worker.models.abilities import has_reactions, has_transients
+from sprag_study.worker.models.abilities import has_reactions, has_speeds, has_transients
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -125,6 +125,8 @@ def case_detail(store: Store, study_id: str, study: Study, case: int) -> CaseDet
     links = {"self": own, "study": study_address(study_id), "trajectory": f"{own}/trajectory"}
     if has_transients(study):
         links["transient"] = f"{own}/transient"
+    if has_speeds(study):
+        links["speeds"] = f"{own}/speeds"
     if models.has_clutches(study):
         links |= {name: f"{own}/{name}" for name in ("engagements", "duty")}
     if has_reactions(study):

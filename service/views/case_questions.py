@@ -298,6 +298,21 @@ class BasinQuestion:
 
 
 @dataclass(frozen=True, slots=True)
+class SpeedsQuestion:
+    """With which load."""
+
+    load: Annotated[
+        str | None,
+        Setting(
+            "factor on the torque of all operations; by default 1",
+            examples=("1.5",),
+            metavar="FACTOR",
+            label=N_("Factor on the load"),
+        ),
+    ] = None
+
+
+@dataclass(frozen=True, slots=True)
 class TransientQuestion:
     """Which transient, with which load, from which angle, and how far."""
 
@@ -455,6 +470,19 @@ BASIN: Final = ViewInfo(
         "these starts, its mean speed and its order. The case is run from every start for this."
     ),
 )
+SPEEDS: Final = ViewInfo(
+    "speeds",
+    SpeedsQuestion,
+    "Compute every steady cycle of a machine shaft: its speed, its multiplier, and from which speeds the shaft comes "
+    "to it.",
+    starts=False,
+    title=N_("All steady speeds, and to which the shaft comes"),
+    note=N_(
+        "By how much the shaft is faster a cycle later, over its speed at the angle 0. It turns steadily where the "
+        "line crosses zero: falling, in a stable cycle; rising, in an unstable one, from which the shaft goes to one "
+        "of its neighbours, or stops or runs away."
+    ),
+)
 TRANSIENT: Final = ViewInfo(
     "transient",
     TransientQuestion,
@@ -468,4 +496,4 @@ TRANSIENT: Final = ViewInfo(
     ),
 )
 #: Every view of a case, in the order of the API.
-CASE_VIEWS: Final = (TRAJECTORY, ENGAGEMENTS, DUTY, FORCES, STROBES, BRANCH, DIAGRAM, SECTION, BASIN, TRANSIENT)
+CASE_VIEWS: Final = (TRAJECTORY, ENGAGEMENTS, DUTY, FORCES, STROBES, BRANCH, DIAGRAM, SECTION, BASIN, SPEEDS, TRANSIENT)

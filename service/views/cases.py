@@ -12,6 +12,7 @@ from sprag_study.service.views.engagements import EngagementsView
 from sprag_study.service.views.forces import ForcesView
 from sprag_study.service.views.portrait import StrobesView
 from sprag_study.service.views.sections import DiagramView, SectionView
+from sprag_study.service.views.speeds import SpeedsView
 from sprag_study.service.views.trajectory import TrajectoryView
 from sprag_study.service.views.transient import TransientView
 
@@ -21,6 +22,6 @@ CASE_VIEWS: Final[dict[str, CaseView[Any, Any, Any]]] = {
     for view in (
         TrajectoryView(), EngagementsView(), DutyView(), ForcesView(), StrobesView(), BranchView(), DiagramView(),
         SectionView(),
-        BasinView(), TransientView(),
+        BasinView(), SpeedsView(), TransientView(),
     )
 }  # fmt: skip

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from sprag_study.engine.machine_shaft.steady_cycles import SteadyCycles
     from sprag_study.engine.machine_shaft.transient_course import Course, Transient
     from sprag_study.engine.outcome import Basin, Duty, Engagements, Portrait
     from sprag_study.worker.models.branches import Along, CaseBranch
@@ -46,6 +47,12 @@ def has_strobes(study: Study) -> bool:
 def has_transients(study: Study) -> bool:
     """Whether the machine of the study has transients."""
     return model_of(study.model).transients is not None
+
+
+def has_speeds(study: Study) -> bool:
+    """Whether torques of the machine follow the speed, so that it has steady cycles at certain speeds."""
+    speeds = model_of(study.model).speeds
+    return speeds is not None and speeds.has(study)
 
 
 def run_engagements(study: Study, case: int) -> Engagements:
@@ -128,6 +135,11 @@ def shape_of_transients(study: Study) -> KernelShape:
 def run_transient(study: Study, case: int, course: Course, points: int) -> Transient:
     """A transient of one case, with ``points`` equally spaced times; ValueError where its model has none."""
     return _transients(study).run(study, case, course, points)
+
+
+def run_speeds(study: Study, case: int, load: float) -> SteadyCycles:
+    """Every steady cycle of one case with a factor on its load; ValueError where no torque follows the speed."""
+    return _of(study, model_of(study.model).speeds, "torques that follow the speed").run(study, case, load)
 
 
 def _strobes(study: Study) -> Strobes:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from sprag_study.engine import Ending
     from sprag_study.engine.catalogue import Parameter, ResultInfo
+    from sprag_study.engine.machine_shaft.steady_cycles import SteadyCycles
     from sprag_study.engine.machine_shaft.transient_course import Course, Transient
     from sprag_study.engine.outcome import Basin, Duty, Engagements, Portrait, Trajectory
     from sprag_study.worker.models.branches import Along, CaseBranch
@@ -96,6 +97,18 @@ class Transients(Protocol):
 
     def run(self, study: Study, case: int, course: Course, points: int) -> Transient:
         """A transient of a case with ``points`` equally spaced times."""
+        ...
+
+
+class Speeds(Protocol):
+    """The machines of a model have torques that follow the speed, and steady cycles at one speed or several."""
+
+    def has(self, study: Study) -> bool:
+        """Whether torques of the machine follow the speed."""
+        ...
+
+    def run(self, study: Study, case: int, load: float) -> SteadyCycles:
+        """Every steady cycle of a case with a factor on the torque of its operations."""
         ...
 
 
@@ -228,6 +241,11 @@ class Model(Protocol):
     @property
     def transients(self) -> Transients | None:
         """The transients of its machines; None where they have none."""
+        return None
+
+    @property
+    def speeds(self) -> Speeds | None:
+        """The steady cycles of its machines; None where motions do not repeat by themselves."""
         return None
 
     def lanes_per_case(self, study: Study) -> int:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from sprag_study.service.answers.key import AnswerReport
     from sprag_study.service.answers.results import BasinData, Branch, Map, Portrait, SensitivityReport
     from sprag_study.service.answers.sections import Sections
+    from sprag_study.service.answers.speeds import SteadySpeeds
     from sprag_study.service.answers.transients import Transient
     from sprag_study.service.client.queries import Ends, Held, Value
 
@@ -443,6 +444,18 @@ class AsyncStudyViews(AsyncStudyPart):
             }
         )
         return cast("BasinData", await self._of_case(case, "/basin", query))
+
+    async def speeds(self, case: int, *, load: Value | None = None) -> SteadySpeeds:
+        """Compute every steady cycle of a machine shaft: its speed, its multiplier, and from which speeds the shaft
+        comes to it.
+
+        Parameters
+        ----------
+        load : float or str, optional
+            Factor on the torque of all operations; by default 1.
+        """
+        query = query_of({"load": load})
+        return cast("SteadySpeeds", await self._of_case(case, "/speeds", query))
 
     async def transient(
         self,

@@ -55,6 +55,7 @@ OTHERS = {
             "regimes",
             "section",
             "settled",
+            "speeds",
             "strobes",
             "trajectory",
             "transient",

@@ -74,6 +74,7 @@ OPERATIONS: dict[str, tuple[Call, str]] = {
     "get_duty": (lambda _, s: s.duty(3, exponent=5), "show ID duty --case 3"),
     "get_forces": (lambda _, s: s.forces(3), "show ID forces --case 3"),
     "get_strobes": (lambda _, s: s.strobes(3), "show ID strobes --case 3"),
+    "get_speeds": (lambda _, s: s.speeds(3), "show ID speeds --case 3"),
     "get_transient": (lambda _, s: s.transient(3, "run-up"), "show ID transient --case 3 --kind run-up"),
     "get_basin": (lambda _, s: s.basin(3), "show ID basin --case 3"),
     "fit_clutch": (lambda c, _: c.fit_clutch([(0, 0)], 0.1), "fit DATA --accuracy 1 --server http://sprag"),

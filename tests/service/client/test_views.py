@@ -52,6 +52,7 @@ CALLS: list[tuple[str, tuple[Any, ...], dict[str, Any], str]] = [
      "along=shaft.load&from=0&to=1&phase=90 deg&points=5&strobes=9"),
     ("section", (3, "90 deg", 50), {}, "phase=90 deg&strobes=50"),
     ("basin", (3, "x", "y"), {"x_range": (0, "1 rad"), "points": 2}, "x=x&y=y&x_from=0&x_to=1 rad&points=2"),
+    ("speeds", (3,), {"load": 1.5}, "load=1.5"),
     ("transient", (3, "load-step"), {"load": 1.5, "angle": "1 deg", "torque": 2, "within": 0.1, "revolutions": 9},
      "kind=load-step&load=1.5&angle=1 deg&torque=2&within=0.1&revolutions=9"),
 ]  # fmt: skip

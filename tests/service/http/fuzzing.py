@@ -70,6 +70,7 @@ FURTHER_RULES: Final = (
     "get_trajectory",
     "get_branch",
     "get_transient",
+    "get_speeds",
     "get_diagram",
     "get_section",
     "get_basin",

@@ -33,7 +33,7 @@ HEAVY = {
         (
             *("get_transient", "get_forces", "get_basin", "get_trajectory", "get_section", "get_branch", "get_strobes"),
             *("get_duty", "get_engagements", "get_yield", "get_exploration", "get_ribbon", "get_answers", "get_front"),
-            *("get_map", "get_sensitivity", "get_calibration"),
+            *("get_map", "get_sensitivity", "get_calibration", "get_speeds"),
         ),
         ("coverage",),
     ),
@@ -58,6 +58,7 @@ NEVER_SERVED = {
             "cases/{case}/strobes",
             "cases/{case}/branch",
             "cases/{case}/transient",
+            "cases/{case}/speeds",
             "cases/{case}/diagram",
             "cases/{case}/section",
             "cases/{case}/basin",

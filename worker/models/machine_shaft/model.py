@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import replace
 from functools import cache
 from itertools import product
@@ -48,9 +49,10 @@ if TYPE_CHECKING:
 
     from sprag_study.engine.catalogue import Parameter, ResultInfo
     from sprag_study.engine.machine_shaft.sketch import Sketch
+    from sprag_study.engine.machine_shaft.steady_cycles import SteadyCycles
     from sprag_study.engine.machine_shaft.transient_course import Course, Transient
     from sprag_study.engine.outcome import Trajectory
-    from sprag_study.worker.models.model import Transients
+    from sprag_study.worker.models.model import Speeds, Transients
     from sprag_study.worker.models.presentation import Presentation
     from sprag_study.worker.study import Study
 
@@ -296,6 +298,10 @@ class MachineShaft(Model):
     def transients(self) -> Transients:
         return _Transients()
 
+    @property
+    def speeds(self) -> Speeds:
+        return _Speeds()
+
     def estimate_seconds_per_case(self, study: Study) -> float:
         from sprag_study.engine.machine_shaft.estimate import estimate_seconds
 
@@ -329,6 +335,24 @@ class _Transients:
         from sprag_study.engine.machine_shaft.transients import transient
 
         return transient(spec_of(study.structure), case_machine(study, case), course, points)
+
+
+class _Speeds:
+    def has(self, study: Study) -> bool:
+        """With a motor, or with a formula of a load that uses ``omega``, unless a constant stands for the loads."""
+        spec = spec_of(study.structure)
+        if spec.balance == "motor" or (spec.balance == "constant" and spec.balance_side == "operation"):
+            return spec.balance == "motor"
+        formulas = (part.operation.formula for _, part in spec.every_part() if part.operation.form == "formula")
+        return "omega" not in spec.constants and any(re.search(r"\bomega\b", text or "") for text in formulas)
+
+    def run(self, study: Study, case: int, load: float) -> SteadyCycles:
+        from sprag_study.engine.machine_shaft.steady_cycles import steady_cycles
+
+        found = steady_cycles(spec_of(study.structure), case_machine(study, case), load)
+        if found is None:
+            raise ValueError("no torque of the machine follows the speed")
+        return found
 
 
 def _run_each_kind() -> bytes:

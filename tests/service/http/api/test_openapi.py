@@ -204,7 +204,7 @@ def studied(service: Service, path: str, usual: str | None = None) -> str:
     if path.endswith("/basin"):
         ranges = {"shaft.initial_speed": [0, 30], "pendulums.0.initial_angle": [-0.1, 0.1]}
         spec = {**SPEC, "starts": {"count": 2, "ranges": ranges}}
-    if path.endswith("/transient"):
+    if path.endswith(("/transient", "/speeds")):
         spec = tomllib.loads((Path(__file__).resolve().parents[4] / "examples" / "slotter.toml").read_text())
     kinds = {"front": search, "calibration": calibration, "{study_id}:narrow": swept_study}
     chosen = kinds.get(path.rpartition("/")[2])

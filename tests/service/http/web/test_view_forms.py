@@ -50,7 +50,7 @@ ASKED = {
 }  # fmt: skip
 #: The views that the cases of each model have.
 HAVE = {
-    "drive": set(PARTS) - {"transient"},
+    "drive": set(PARTS) - {"transient", "speeds"},
     "press": {"transient"},
     "toy": set[str](),
 }
