@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass
 
 import pytest
@@ -35,16 +36,47 @@ class Office:
         }
 
 
-@pytest.fixture(scope="session")
-def office() -> Iterator[Office]:
+_SHARED = pytest.StashKey[tuple[ExitStack, Office, Service]]()
+_FIXTURES = {"office", "running"}
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> Iterator[None]:
+    """End the service before a file that needs none: it looks for work and files as long as it runs."""
+    try:
+        return (yield)
+    finally:
+        goes_on = nextitem is not None and (nextitem.path == item.path or _FIXTURES & set(nextitem.fixturenames))
+        if not goes_on and _SHARED in item.config.stash:
+            item.config.stash[_SHARED][0].close()
+            del item.config.stash[_SHARED]
+
+
+@pytest.fixture(scope="module")
+def _shared(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> tuple[Office, Service]:
+    stash = request.config.stash
+    if _SHARED not in stash:
+        stack = ExitStack()
+        request.config.add_cleanup(stack.close)
+        office = Office(
+            stack.enter_context(mail_server()), stack.enter_context(webhook()), stack.enter_context(otlp.receiver())
+        )
+        folder = tmp_path_factory.mktemp("served")
+        options = {"SPRAG_CHUNK_CASES": "7", **office.settings}
+        stash[_SHARED] = stack, office, stack.enter_context(service(folder, "--processes", 1, **options))
+    return stash[_SHARED][1:]
+
+
+@pytest.fixture(scope="module")
+def office(_shared: tuple[Office, Service]) -> Office:
     """Receivers for what `running` sends."""
-    with mail_server() as mails, webhook() as hook, otlp.receiver() as traces:
-        yield Office(mails, hook, traces)
+    return _shared[0]
 
 
-@pytest.fixture(scope="session")
-def running(tmp_path_factory: pytest.TempPathFactory, office: Office) -> Iterator[Service]:
-    """A running service with one process for cases; other tests submit studies to it too. Its chunks are short."""
-    folder = tmp_path_factory.mktemp("served")
-    with service(folder, "--processes", 1, SPRAG_CHUNK_CASES="7", **office.settings) as started:
-        yield started
+@pytest.fixture(scope="module")
+def running(_shared: tuple[Office, Service]) -> Service:
+    """A running service with one process for cases, which the files share that need it and follow each other.
+
+    Other tests submit studies to it too. Its chunks are short.
+    """
+    return _shared[1]

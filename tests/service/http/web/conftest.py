@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Final
 from urllib.parse import urlsplit
 
@@ -56,6 +57,11 @@ class Office:
                     break
         return self.get(f"/studies/{study_id}")
 
+    @cached_property
+    def example(self) -> str:
+        """The id of the example, which has ended."""
+        return self.submit()
+
     def get(self, path: str, **params: Any) -> Any:
         """JSON of an address of the interface."""
         answer = self.http.get("/api/v1" + path, params=params)
@@ -96,6 +102,7 @@ def chromium() -> str:
 #: Drawings that move take a whole core while a test waits for something else.
 STILL: Final[dict[str, Any]] = {"reduced_motion": "reduce"}
 _BROWSER = pytest.StashKey[tuple[ExitStack, Browser]]()
+_OFFICE = pytest.StashKey[tuple[ExitStack, Office]]()
 
 
 @pytest.fixture(scope="module")
@@ -114,30 +121,38 @@ def browser(chromium: str, request: pytest.FixtureRequest) -> Browser:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> Iterator[None]:
-    """Close the browser before a file that needs none: beside its event loop no other could run."""
+    """Close the browser and the service before a file that needs none.
+
+    Beside the browser's event loop no other could run, and a service looks for work and files as long as it runs.
+    """
     try:
         return (yield)
     finally:
         goes_on = nextitem is not None and (nextitem.path == item.path or "browser" in nextitem.fixturenames)
-        if not goes_on and _BROWSER in item.config.stash:
-            item.config.stash[_BROWSER][0].close()
-            del item.config.stash[_BROWSER]
+        for key in () if goes_on else (_BROWSER, _OFFICE):
+            if key in item.config.stash:
+                item.config.stash[key][0].close()
+                del item.config.stash[key]
 
 
-@pytest.fixture(scope="session")
-def office(tmp_path_factory: pytest.TempPathFactory, chromium: str) -> Iterator[Office]:
-    """A service with a database of its own, for all tests."""
-    with (
-        service(tmp_path_factory.mktemp("office"), SPRAG_PROCESSES="1", SPRAG_CHECK_PROCESSES="1") as started,
-        httpx.Client(base_url=started.address, timeout=SECONDS) as client,
-    ):
-        yield Office(started.address, client)
+@pytest.fixture(scope="module")
+def office(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Office:
+    """A service with a database of its own, which the files share that need a browser and follow each other."""
+    stash = request.config.stash
+    if _OFFICE not in stash:
+        stack = ExitStack()
+        request.config.add_cleanup(stack.close)
+        folder = tmp_path_factory.mktemp("office")
+        started = stack.enter_context(service(folder, SPRAG_PROCESSES="1", SPRAG_CHECK_PROCESSES="1"))
+        client = stack.enter_context(httpx.Client(base_url=started.address, timeout=SECONDS))
+        stash[_OFFICE] = stack, Office(started.address, client)
+    return stash[_OFFICE][1]
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def example(office: Office) -> str:
     """The example study, finished: two axes, nine cases."""
-    return office.submit()
+    return office.example
 
 
 @contextmanager
