@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import os
 import re
 from contextlib import suppress
 from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
+import psutil
 from fastapi import Query
 from starlette.responses import Response
 
@@ -56,6 +58,8 @@ _VALUES: Final = 25
 _LOOK: Final = 0.5
 #: Seconds of a service without a page before it computes the first machines all the same.
 _UNVISITED_SECONDS: Final = 20.0
+#: Seconds that a service without a page waits for a core that nothing else uses.
+_BUSY_SECONDS: Final = 600.0
 #: Width of the picture (px), unless the page says another.
 _WIDTH: Final = 560
 
@@ -192,15 +196,27 @@ def _read_ahead() -> None:
         choices_of(values, base_of(values, {}))
 
 
+def _has_time(passed: float) -> bool:
+    """Whether a service without visits computes ahead, so many seconds after its start."""
+    if not _UNVISITED_SECONDS < passed < _BUSY_SECONDS:
+        return passed >= _BUSY_SECONDS
+    try:
+        running, *_ = psutil.getloadavg()
+    except OSError:  # a sandbox may hide it
+        return True
+    return running < (os.cpu_count() or 1)
+
+
 async def warm(context: Context) -> None:
     """Compute the machine with which the form of each model begins, so that nobody waits for the first one.
 
-    It begins with the first page, or after `_UNVISITED_SECONDS`: beside the start of a service it would take a core
-    from the first requests, and as much processor time as the rest of the start.
+    It begins with the first page, or where none is opened in `_UNVISITED_SECONDS`: beside the start of a service it
+    would take a core from the first requests, and as much processor time as the rest of the start. On a busy machine it
+    waits longer, until a core is free or `_BUSY_SECONDS` have passed.
     """
-    later = monotonic() + _UNVISITED_SECONDS
+    started = monotonic()
     try:
-        while not context.ready.is_set() or not (context.visited.is_set() or monotonic() > later):
+        while not context.ready.is_set() or not (context.visited.is_set() or _has_time(monotonic() - started)):
             await asyncio.sleep(_LOOK)
         await in_thread(_read_ahead)
         for model in models.model_names():

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from sprag_study.service.http.views import preset_of
+from sprag_study.service.http.web.form import live
 from sprag_study.service.http.web.form.live import drawn_machine
 from sprag_study.service.http.web.form.own_machine import single_machine
 from sprag_study.service.http.web.form.sent import settle
@@ -17,6 +18,8 @@ from sprag_study.service.spec.document import parse_spec
 from tests.service.http.web.controls import Controls
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from tests.service.conftest import Service
 
 DRIVE = preset_of("one_pendulum")["spec"]
@@ -88,3 +91,18 @@ def test_a_case_is_a_new_study_in_the_motion_that_it_comes_to(service: Service) 
     assert {path: base[path] for path in study.axis_paths} == pytest.approx(study.case_parameters(100))
     assert base["pendulums.0.initial_angle"] != 0.0
     assert shown["from"] == study_id
+
+
+def test_machines_are_computed_ahead_on_a_free_core(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("os.cpu_count", lambda: 4)
+
+    def ahead(average: Callable[[], tuple[float, float, float]]) -> list[bool]:
+        monkeypatch.setattr("psutil.getloadavg", average)
+        return [live._has_time(passed) for passed in (1.0, 21.0, 599.0, 601.0)]
+
+    def hidden() -> tuple[float, float, float]:
+        raise OSError("no such file")
+
+    assert ahead(lambda: (3.9, 5.0, 5.0)) == [False, True, True, True]
+    assert ahead(lambda: (4.1, 0.0, 0.0)) == [False, False, False, True]
+    assert ahead(hidden) == [False, True, True, True]
