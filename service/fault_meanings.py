@@ -123,6 +123,7 @@ WARNING_MEANINGS: Final[dict[WarningCode, str]] = {
     "nothing-moves": "Both amplitudes of the base are 0.",
     "replaced-value": "The value is replaced, as another field requires.",
     "rows-in-backlash": "Some measured rows lie within the backlash and were left out of the fit.",
+    "several-speeds": "The shaft may turn steadily at more speeds than the one that the results are about.",
     "short-search": "The search for a settled motion is too short for the means of irregular motion.",
     "short-window": "The window is shorter than one excitation period.",
     "slow-excitation": "The excitation is slow for a vibration drive.",

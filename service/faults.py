@@ -97,6 +97,7 @@ WarningCode = Literal[
     "nothing-moves",
     "replaced-value",
     "rows-in-backlash",
+    "several-speeds",
     "short-search",
     "short-window",
     "slow-excitation",

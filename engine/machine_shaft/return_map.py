@@ -102,6 +102,16 @@ class ReturnMap:
             total, by_speed = total + torque, by_speed + slope
         return total, by_speed / (piece.inertia * omega)
 
+    def mean_torque(self, omega: Floats) -> Floats:
+        """Mean torque in N*m over the cycle of a shaft that turns evenly at ``omega`` (n,), in rad/s."""
+        total = np.zeros(len(omega))
+        cuts = np.unique(self._bench.panels.cuts[0])
+        for low, high in pairwise(cuts.tolist()):
+            piece = self._piece(low, high)
+            torque = self.torque(piece, 0.5 * piece.inertia * np.square(omega)[:, None])[0]
+            total += piece.half * apply(WEIGHTS[None, :], torque)[:, 0]
+        return np.asarray(total / cuts[-1])
+
     def _collocated(self, piece: _Piece, begin: Floats, backward: bool) -> tuple[Floats, Floats, Floats, Floats]:
         """Energies at the nodes, that at the other end, its derivative by ``begin``, and the error; inf if none."""
         matrix = piece.half * (RUNNING - WEIGHTS if backward else RUNNING)

@@ -311,3 +311,25 @@ def steady_cycles(model: MachineSpec, columns: Mapping[str, ArrayLike], load: fl
     if bench is None:
         return SteadyCycles((), None, 0.0, np.inf, none, none, True, ending)
     return cycles_on(bench, ending, load) if bench.follows_speed else None
+
+
+def other_speed(model: MachineSpec, columns: Mapping[str, ArrayLike]) -> float:
+    """The slowest other speed in rad/s at which an even shaft would be held besides that of the case; NaN for none.
+
+    It is one at which the mean torque over the cycle falls through zero: a guess of a further stable cycle at the cost
+    of a few cases. Parameters and errors are those of ``steady_cycles``.
+    """
+    check_structure(model)
+    bench, ending = bench_of(model, Columns.of(model, columns, 1))
+    if bench is None or not bench.follows_speed or ending not in {Ending.OK, Ending.UNSTABLE}:
+        return np.nan
+    speeds = float(bench.machine.pace[0, 0, 0]) * _SCAN
+    with np.errstate(all="ignore"):
+        torque = ReturnMap(bench).mean_torque(speeds)
+    held = np.nonzero((torque[:-1] > 0.0) & (torque[1:] <= 0.0))[0]
+    share = torque[held] / (torque[held] - torque[held + 1])
+    found = speeds[held] + share * (speeds[held + 1] - speeds[held])
+    if ending is Ending.OK and found.size:
+        steady = bench.steady(1.0)
+        found = np.delete(found, int(np.argmin(np.abs(found - (steady.mean if steady else np.inf)))))
+    return float(found[0]) if found.size else np.nan

@@ -27,6 +27,12 @@ from tests.service.spec_sample import parsed
 _STEP = {"quantity": "force", "over": "stroke", "steps": [{"from": 0.2, "to": 0.8, "value": 100}]}
 _TURN = {"quantity": "torque", "steps": [{"from": 1, "to": 2, "value": 100}]}
 _MOTOR = {"/base/drive/motor": LINEAR, "/base/balance": ..., "/base/mean_speed": ..., "/axes": []}
+_SADDLE = {
+    "balance": "motor", "operation": {"quantity": "torque", "value": 52},
+    "drive": {"inertia": 3, "motor": {"kind": "table", "interpolation": "linear", "table": [
+        [0, 90], [10, 70], [25, 40], [100, 115], [140, 43], [157, 0],
+    ]}},
+}  # fmt: skip
 _UNSTABLE = {
     "mean_speed": "12 rad/s", "drive": {"inertia": "2 kg*m^2"},
     "operation": {"quantity": "torque", "formula": "100/omega*(1 + 0.5*sin(phi))"},
@@ -100,8 +106,8 @@ def of_shafts() -> Iterator[str]:
     base = whole["base"]
     base["parts"] = [{name: base.pop(name) for name in ("mechanism", "operation")}, {"crank_angle": "90 deg"}]
     yield from parse_spec(whole).warnings
-    spec = {"sprag": 1, "model": "machine-shaft", "base": _UNSTABLE, "axes": []}
-    yield from parse_spec(spec).warnings
+    for base in (_UNSTABLE, _SADDLE):
+        yield from parse_spec({"sprag": 1, "model": "machine-shaft", "base": base, "axes": []}).warnings
 
 
 def _axis(name: str, values: list[Any]) -> list[dict[str, Any]]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache, partial
 from typing import Any, Final, cast
 
-from sprag_study.sentences import Sentence
+from sprag_study.sentences import Amount, Sentence
 from sprag_study.service.faults import Code
 from sprag_study.service.spec.fields import base_pointer
 from sprag_study.service.spec.report import Report
@@ -94,6 +95,14 @@ def check_machine(
     try:
         if machine_shaft.check(structure, values) is Ending.UNSTABLE:
             report.warn("unstable-motion", "/base", _UNSTABLE)
+        other = machine_shaft.other_speed(structure, values)
+        if math.isfinite(other):
+            message = Sentence(
+                "the torques of this machine balance at about {speed} too, so that its shaft may turn steadily at more "
+                "speeds than the one of the results: the section of all steady speeds of a case has them",
+                speed=Amount(other, "rad/s", 4),
+            )
+            report.warn("several-speeds", "/base", message)
     except ExpressionError as error:
         formula = _at(structure, error.part).get("formula") if error.part in places else None
         report.fault(places.get(error.part, "/base"), "invalid-formula", error.message, formula)

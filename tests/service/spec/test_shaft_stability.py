@@ -25,3 +25,10 @@ def test_an_unstable_base_is_read_with_a_warning() -> None:
     assert done.endings == ["unstable_motion"] * 2
     names = [info.name for info in models.study_results(parsed.study)]
     assert (done.values[:, names.index("cycle.multiplier")] > 1.0).all()
+
+
+def test_a_base_that_may_turn_at_several_speeds_is_read_with_a_warning() -> None:
+    """A load with humps over the speed: 20 + 10 sin w + 0.1 w is at 5.789 rad/s what it is at 12 rad/s."""
+    texts = {warning.code: str(warning) for warning in _parsed("20 + 10*sin(omega) + 0.1*omega").warnings}
+    assert "balance at about 5.78" in texts["several-speeds"]
+    assert "several-speeds" not in {warning.code for warning in _parsed("0.1*omega^2").warnings}

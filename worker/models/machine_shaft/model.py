@@ -153,6 +153,13 @@ def check(structure: Mapping[str, Any], values: Mapping[str, float]) -> Ending:
     return engine_check(spec_of(structure), values)
 
 
+def other_speed(structure: Mapping[str, Any], values: Mapping[str, float]) -> float:
+    """A further speed in rad/s at which the shaft may turn steadily; NaN for none."""
+    from sprag_study.engine.machine_shaft.steady_cycles import other_speed as engine_other_speed
+
+    return engine_other_speed(spec_of(structure), values)
+
+
 def base_results(structure: Mapping[str, Any], values: Mapping[str, float]) -> dict[str, float]:
     """Results of the machine with these numbers, by name; NaN for missing ones."""
     from sprag_study.engine.machine_shaft.simulate import simulate

@@ -65,6 +65,7 @@ SHAFT: dict[WarningCode, str] = {
     "no-such-angle": "/base/phi_c: 3 is out of range: the machine of base has 2 angles with T = T_mean",
     "nothing-acts": "/base/parts/1: has neither a mechanism nor an operation, so it does nothing",
     "replaced-value": '/base/parts/0/operation: is not used: the balance "constant" replaces it',
+    "several-speeds": "/base: the torques of this machine balance at about 19.01 rad/s too",
     "table-ends-early": "/base/drive/torque: the table ends at 180 deg, 180 deg before its cycle of 360 deg",
     "unstable-motion": "/base: the steady motion of the machine is unstable",
     "wraps-around": "/axes/0 (operation.steps.0.to): where `from` exceeds `to` the step continues",
