@@ -3,17 +3,22 @@
 import math
 from collections.abc import Iterable, Mapping
 from enum import IntEnum, auto
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sprag_study.engine import elementary
 from sprag_study.engine.run import Run
 from sprag_study.engine.vibration_drive.parameters import (
     CURVE,
     DRAG,
+    HARMONIC_FACTOR,
+    HARMONICS,
     LOAD_FACTOR,
     LOAD_TABLE,
     MAX_COEFFICIENTS,
+    MAX_HARMONICS,
     MAX_LOAD_ROWS,
     MAX_PENDULUMS,
     PARAMETERS,
@@ -24,13 +29,17 @@ Floats = NDArray[np.float64]
 
 class Column(IntEnum):
     """Columns of a case that its excitation and its shaft have; after them come the speeds and the torques of the table
-    of its load, the stops, then the pendulums."""
+    of its load, the stops, the pendulums, then the harmonics of the base."""
 
     NU = 0
     PERIOD = auto()
     ACC_X = auto()
     ACC_Y = auto()
     CHI = auto()
+    VIBRATION_X = auto()
+    VIBRATION_Y = auto()
+    HIGHEST_ORDER = auto()
+    HARMONICS = auto()
     GRAVITY = auto()
     LOAD = auto()
     BEARING = auto()
@@ -66,6 +75,30 @@ class PendulumColumn(IntEnum):
     CLUTCH = auto()
 
 
+class HarmonicColumn(IntEnum):
+    """Columns that each harmonic of the base has: its order, and the factors of cosine and sine of its angle in the
+    acceleration of the base in x and y, in m/s^2."""
+
+    ORDER = 0
+    X_COS = auto()
+    X_SIN = auto()
+    Y_COS = auto()
+    Y_SIN = auto()
+
+
+class Harmonic(NamedTuple):
+    """A harmonic of the base of some cases: its order, and amplitudes (m) and phases (rad) along x and y.
+
+    The base moves by ``amplitude_x cos(order nu t + phase_x)`` and ``amplitude_y sin(order nu t + phase_y)``.
+    """
+
+    order: Floats
+    amplitude_x: Floats
+    phase_x: Floats
+    amplitude_y: Floats
+    phase_y: Floats
+
+
 #: Columns with the speeds of the rows of the table of the load, and with their torques.
 TABLE_SPEEDS = slice(len(Column), len(Column) + MAX_LOAD_ROWS)
 TABLE_TORQUES = slice(TABLE_SPEEDS.stop, TABLE_SPEEDS.stop + MAX_LOAD_ROWS)
@@ -73,6 +106,9 @@ SHAFT_COLUMNS = TABLE_TORQUES.stop
 #: Stops, each a pair of columns: whole periods, fraction.
 STOPS = 4
 PENDULUM_COLUMNS = len(PendulumColumn)
+HARMONIC_COLUMNS = len(HarmonicColumn)
+#: Numbers of harmonics for which there are kernels.
+_ROOMS = (0, 2, 4, 8, MAX_HARMONICS)
 #: Fewest clutch coefficients of a kernel: the straight line beyond the data needs two.
 MIN_COEFFICIENTS = 2
 #: A stop this close to a whole period counts as one.
@@ -149,6 +185,57 @@ def load_table(columns: Mapping[str, ArrayLike], cases: int) -> tuple[Floats, Fl
     return speeds, torques * factor.reshape(-1, 1)
 
 
+def _harmonic_numbers(paths: Iterable[str]) -> list[int]:
+    return sorted({int(path.split(".")[2]) for path in paths if path.startswith(HARMONICS)})
+
+
+def harmonic_room(paths: Iterable[str]) -> int:
+    """Number of harmonics that a kernel for a base with these parameters has; 0 where the base has none.
+
+    Raises
+    ------
+    ValueError
+        If there are more than `MAX_HARMONICS`.
+    """
+    count = len(_harmonic_numbers(paths))
+    if count > MAX_HARMONICS:
+        raise ValueError(f"a base vibration has at most {MAX_HARMONICS} harmonics")
+    return next(room for room in _ROOMS if count <= room)
+
+
+def harmonics(columns: Mapping[str, ArrayLike], cases: int) -> list[Harmonic]:
+    """The harmonics of the base of some cases, arrays of shape (cases,); their amplitudes have their factor."""
+
+    def column(path: str, default: float = 0.0) -> Floats:
+        return np.broadcast_to(np.asarray(columns.get(path, default), dtype=np.float64), (cases,))
+
+    factor = column(HARMONIC_FACTOR, 1.0)
+    listed = []
+    for k in _harmonic_numbers(columns):
+        order, x, phase_x, y, phase_y = (column(f"{HARMONICS}{k}.{name}") for name in Harmonic._fields)
+        listed.append(Harmonic(order, factor * x, phase_x, factor * y, phase_y))
+    return listed
+
+
+def _harmonic_columns(harmonic: Harmonic, nu: Floats) -> list[Floats]:
+    """Columns of a harmonic in the order of `HarmonicColumn`."""
+    square = np.square(harmonic.order * nu)
+    x, y = harmonic.amplitude_x * square, harmonic.amplitude_y * square
+    return [
+        harmonic.order,
+        -x * elementary.cos(harmonic.phase_x), x * elementary.sin(harmonic.phase_x),
+        -y * elementary.sin(harmonic.phase_y), -y * elementary.cos(harmonic.phase_y),
+    ]  # fmt: skip
+
+
+def of_pendulums(matrix: Floats, pendulums: int, column: PendulumColumn) -> Floats:
+    """A column of every pendulum of the cases of a matrix, shape (cases, pendulums)."""
+    harmonic = int(matrix[0, Column.HARMONICS]) * HARMONIC_COLUMNS if len(matrix) else 0
+    width = (matrix.shape[1] - stop_column(STOPS) - harmonic) // pendulums
+    first = stop_column(STOPS) + int(column)
+    return matrix[:, first : first + pendulums * width : width]
+
+
 def load_at_rest(matrix: Floats) -> Floats:
     """Mean torque in N*m up to which the load of each case of a matrix holds a shaft that stands, shape (cases,)."""
     load: Floats = matrix[:, Column.LOAD] + matrix[:, Column.STRIBECK] + matrix[:, TABLE_TORQUES.start]
@@ -173,24 +260,20 @@ def unloaded(matrix: Floats, pendulums: int) -> NDArray[np.bool_]:
     terms = (Column.LOAD, Column.BEARING, Column.LINEAR, Column.QUADRATIC, Column.STRIBECK)
     resisting = [*map(int, terms), *range(TABLE_TORQUES.start, TABLE_TORQUES.stop)]
     # A drive with drag in an overrunning clutch has a backstop.
-    width = (matrix.shape[1] - stop_column(STOPS)) // pendulums
-    drags = matrix[:, stop_column(STOPS) + PendulumColumn.OVERRUNNING_DAMPING :: width]
+    drags = of_pendulums(matrix, pendulums, PendulumColumn.OVERRUNNING_DAMPING)
     free: NDArray[np.bool_] = np.all(matrix[:, resisting] == 0.0, axis=1) & ~np.any(drags > 0.0, axis=1)
     return free
 
 
 def turns_freely(matrix: Floats, pendulums: int) -> NDArray[np.bool_]:
     """Which pendulums have no spring, so that one that has turned over is where it was, shape (cases, pendulums)."""
-    width = (matrix.shape[1] - stop_column(STOPS)) // pendulums
-    springs = matrix[:, stop_column(STOPS) + PendulumColumn.SPRING :: width]
-    free: NDArray[np.bool_] = springs == 0.0
+    free: NDArray[np.bool_] = of_pendulums(matrix, pendulums, PendulumColumn.SPRING) == 0.0
     return free
 
 
 def inertia_ratio(matrix: Floats, pendulums: int) -> Floats:
     """Inertia of the shaft of each case of a matrix over that of its pendulums together, shape (cases,)."""
-    width = (matrix.shape[1] - stop_column(STOPS)) // pendulums
-    inertias = matrix[:, stop_column(STOPS) + PendulumColumn.INERTIA :: width]
+    inertias = of_pendulums(matrix, pendulums, PendulumColumn.INERTIA)
     ratio: Floats = matrix[:, Column.INERTIA] / np.add.reduce(inertias, axis=1)
     return ratio
 
@@ -217,10 +300,11 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
     Returns
     -------
     array, shape (cases, columns)
-        `Column`: nu, period, d nu^2, b nu^2, chi, g, M_c, lambda_e, k_1, k_2, M_s, 1/omega_s, kappa M_c, m, psi, J_e,
+        `Column`: nu, period, d nu^2, b nu^2, chi, largest accelerations of the base in x and y, highest order of its
+        harmonics, room for harmonics, g, M_c, lambda_e, k_1, k_2, M_s, 1/omega_s, kappa M_c, m, psi, J_e,
         1/rate, initial speed, step budget; the table of the load; four stops; per pendulum `PendulumColumn`: M l/J,
         c a^2/J, lambda/J, 1/J, J, delta, u_end, lambda_k, lambda_o, initial angle, speed, windup and state of the
-        clutch; its clutch coefficients.
+        clutch; its clutch coefficients. Per harmonic `HarmonicColumn`.
     """
     n, count = pendulum_count(columns), coefficient_count(columns)
 
@@ -240,6 +324,8 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
     # clutches; it converts accelerations to speeds in the error estimate of a step.
     rate = nu
     acc_x, acc_y = (parameter(f"excitation.amplitude_{direction}") * np.square(nu) for direction in "xy")
+    vibrations, highest, overtones = _overtones(columns, cases, nu, (acc_x, acc_y))
+    rate = rate * highest
     gravity = parameter("gravity")
     swing = np.zeros(cases)  # the fastest of the pendulums on what accelerates them
     pendulums: list[Floats] = []
@@ -255,7 +341,7 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
         spring = own["spring_rate"] * np.square(own["spring_arm"]) / inertia
         rate = np.maximum(rate, np.sqrt(spring))
         moment = own["mass"] * own["arm"] / inertia
-        swing = np.maximum(swing, np.sqrt(np.abs(moment) * (gravity + acc_x + acc_y)))
+        swing = np.maximum(swing, np.sqrt(np.abs(moment) * (gravity + vibrations[0] + vibrations[1])))
         law = _law_prefix(columns, i)
         stiffness = np.maximum(column(f"{law}coefficients.1", 0.0), 0.0)
         rate = np.maximum(rate, np.sqrt(stiffness * (1.0 / inertia + 1.0 / shaft_inertia)))
@@ -281,7 +367,10 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
     C = Column
     shaft = {
         C.NU: nu, C.PERIOD: 1.0 / frequency, C.ACC_X: acc_x, C.ACC_Y: acc_y,
-        C.CHI: parameter("excitation.phase"), C.GRAVITY: gravity, C.LOAD: parameter("shaft.load"),
+        C.CHI: parameter("excitation.phase"),
+        C.VIBRATION_X: vibrations[0], C.VIBRATION_Y: vibrations[1], C.HIGHEST_ORDER: highest,
+        C.HARMONICS: np.full(cases, float(len(overtones) // HARMONIC_COLUMNS)),
+        C.GRAVITY: gravity, C.LOAD: parameter("shaft.load"),
         C.BEARING: parameter("shaft.bearing_damping"), C.LINEAR: parameter("shaft.linear_load"),
         C.QUADRATIC: parameter("shaft.quadratic_load"), C.STRIBECK: parameter("shaft.stribeck_load"),
         C.STRIBECK_RATE: 1.0 / parameter("shaft.stribeck_speed"),
@@ -292,7 +381,26 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
     }  # fmt: skip
     stops = [part for time in times for part in _stop(time)]
     table = load_table(columns, cases)
-    return np.ascontiguousarray(np.column_stack([*(shaft[place] for place in C), *table, *stops, *pendulums]))
+    return np.ascontiguousarray(
+        np.column_stack([*(shaft[place] for place in C), *table, *stops, *pendulums, *overtones])
+    )
+
+
+def _overtones(
+    columns: Mapping[str, ArrayLike], cases: int, nu: Floats, plain: tuple[Floats, Floats]
+) -> tuple[tuple[Floats, Floats], Floats, list[Floats]]:
+    """Of a base with harmonics beside the accelerations ``plain``: bounds of the accelerations in x and y, the highest
+    order, and the columns of all harmonics for which the kernel has room.
+    """
+    room = harmonic_room(columns)
+    (x, y), highest, listed = plain, np.ones(cases), harmonics(columns, cases)
+    for harmonic in listed:
+        square = np.square(harmonic.order * nu)
+        x, y = x + harmonic.amplitude_x * square, y + harmonic.amplitude_y * square
+        moves = (harmonic.amplitude_x > 0.0) | (harmonic.amplitude_y > 0.0)
+        highest = np.maximum(highest, np.where(moves, harmonic.order, 1.0))
+    still = [np.zeros(cases)] * (HARMONIC_COLUMNS * (room - len(listed)))
+    return (x, y), highest, [*(column for harmonic in listed for column in _harmonic_columns(harmonic, nu)), *still]
 
 
 def stop_column(stop: int) -> int:

@@ -17,6 +17,7 @@ it is held. A locked clutch has w' = shaft', and its torque follows from this.
 import math
 
 from sprag_study.engine.taylor.straight import (
+    ROUND,
     LaneCode,
     Term,
     exp2,
@@ -30,7 +31,13 @@ from sprag_study.engine.taylor.straight import (
     smaller,
     square,
 )
-from sprag_study.engine.vibration_drive.formulas import base_series, drive, free_acceleration, resistance
+from sprag_study.engine.vibration_drive.formulas import (
+    base_series,
+    drive,
+    free_acceleration,
+    harmonic_series,
+    resistance,
+)
 from sprag_study.engine.vibration_drive.layout import Layout
 
 #: Share of the estimated convergence-limited step that is taken (Jorba and Zou 2005 take e^-2, which is far too careful
@@ -83,7 +90,7 @@ class _Pendulum:
 
 
 def _excitation(code: LaneCode, layout: Layout) -> tuple[list[Term], list[Term]]:
-    """Series of the base's accelerations (2)."""
+    """Series of the base's accelerations (2), with those of its harmonics."""
     names = ("f", "nu", "acc_x", "acc_y", "cos_chi", "sin_chi")
     f, nu, acc_x, acc_y, cos_chi, sin_chi = (code.load(name, getattr(layout, name)) for name in names)
     s, c = sincos(code, code.let("theta", f"6.283185307179586*{f}"), "t")
@@ -95,6 +102,33 @@ def _excitation(code: LaneCode, layout: Layout) -> tuple[list[Term], list[Term]]
         factor = code.let(f"nu2_{k}", f"nu2*{-1.0 / (k * (k - 1))!r}")
         x.append(code.let(f"X{k}", f"{factor}*{x[k - 2]}"))
         y.append(code.let(f"Y{k}", f"{factor}*{y[k - 2]}"))
+    for index in range(layout.harmonics):
+        further_x, further_y = _harmonic(code, layout, index)
+        x = [code.let(f"X{k}", x[k] + further_x[k]) for k in range(layout.order)]
+        y = [code.let(f"Y{k}", y[k] + further_y[k]) for k in range(layout.order)]
+    return x, y
+
+
+def _harmonic(code: LaneCode, layout: Layout, index: int) -> tuple[list[Term], list[Term]]:
+    """Series of the accelerations of the base in x and y by one of its harmonics."""
+    order = code.load("m", layout.harmonic_order + index)
+    factors = [
+        code.load(f"m_{name}", getattr(layout, f"harmonic_{name}") + index)
+        for name in ("x_cos", "x_sin", "y_cos", "y_sin")
+    ]
+    turns = code.let("m_turns", f"{order}*f")
+    part = code.let("m_part", f"{turns} - (({turns} + {ROUND}) - {ROUND})")
+    s, c = sincos(code, code.let("m_theta", f"6.283185307179586*{part}"), "m")
+    rate = code.let("m_rate", f"{order}*nu")
+    x_cos, x_sin, y_cos, y_sin = factors
+    first_x, first_y = harmonic_series(x_cos, x_sin, y_cos, y_sin, rate, s, c)
+    x = [code.let(f"MX{k}", term) for k, term in enumerate(first_x)]
+    y = [code.let(f"MY{k}", term) for k, term in enumerate(first_y)]
+    square_rate = code.let("m_rate2", f"{rate}*{rate}")
+    for k in range(2, layout.order):
+        factor = code.let("m_factor", f"{square_rate}*{-1.0 / (k * (k - 1))!r}")
+        x.append(code.let(f"MX{k}", f"{factor}*{x[k - 2]}"))
+        y.append(code.let(f"MY{k}", f"{factor}*{y[k - 2]}"))
     return x, y
 
 
@@ -282,11 +316,12 @@ def _step_size(
     """Step from the last two coefficients of every speed, relative to the size of that speed's motion."""
     order = layout.order
     code.load("inverse_rate", layout.inverse_rate)
+    largest = (layout.vibration_x, layout.vibration_y) if layout.harmonics else (layout.acc_x, layout.acc_y)
     series = []
     for p in pendulums:
         # The share of the base's drive is for the instant at which a locked pendulum starts from rest without
         # acceleration.
-        least = f"abs({p.ml})*{DRIVE_SHARE}*({code.row(layout.acc_x)} + {code.row(layout.acc_y)})"
+        least = f"abs({p.ml})*{DRIVE_SHARE}*({code.row(largest[0])} + {code.row(largest[1])})"
         scale = code.let(
             f"scale{p.index}",
             f"abs({p.w[0]}) + inverse_rate*(abs({p.w[1]}) + {least} + inverse_rate*abs({p.w[2]})) + 1e-300",
@@ -308,6 +343,8 @@ def _step_size(
     followed = exp2(f"(log2_tolerance + {neglected!r})*{1.0 / (order + 1)!r}")
     code.let("followed", f"{0.5 / math.pi!r}*({followed})")
     longest = code.let("longest", f"({smaller('followed', repr(LONGEST_STEP))})*period")
+    if layout.harmonics:
+        longest = code.let("longest", f"{longest}/{code.row(layout.highest_order)}")
     code.store(layout.h_free, "h_free")
     wanted = smaller("h_free", longest)
     code.let("h_wanted", wanted if bent is None else _watched(code, code.let("h_smooth", wanted), bent, shaft, order))

@@ -235,7 +235,7 @@ def _at_rest(W: Floats, Z: Ints, lay: Layout, lane: int, i: int) -> bool:
     base = lay.pendulums + i * lay.stride
     phi, speed = base + lay.p_phi, base + lay.p_speed
     still = abs(W[phi, lane]) < _STILL and abs(W[speed, lane]) * W[lay.inverse_rate, lane] < _STILL
-    driven = W[lay.acc_x, lane] * W[base + lay.p_ml, lane] != 0.0
+    driven = W[lay.vibration_x, lane] * W[base + lay.p_ml, lane] != 0.0
     if not still or Z[lane, i] == LOCKED or driven or (W[phi, lane] == 0.0 and W[speed, lane] == 0.0):
         return False
     W[phi, lane] = W[speed, lane] = 0.0

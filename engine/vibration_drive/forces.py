@@ -16,7 +16,14 @@ from sprag_study.engine.endings import ENDINGS, Ending
 from sprag_study.engine.outcome import Forces, Trajectory
 from sprag_study.engine.quadrature import gauss
 from sprag_study.engine.run import Run, SettledRun
-from sprag_study.engine.vibration_drive.cases import case_matrix, default_of, scalars, with_lengths
+from sprag_study.engine.vibration_drive.cases import (
+    Harmonic,
+    case_matrix,
+    default_of,
+    harmonics,
+    scalars,
+    with_lengths,
+)
 from sprag_study.engine.vibration_drive.examined import examined_window, read_steps
 from sprag_study.engine.vibration_drive.force_results import Bearing, force_infos
 from sprag_study.engine.vibration_drive.formulas import base_series, drive, free_acceleration
@@ -188,6 +195,7 @@ class _Motion:
     shaft_mass: float
     nu: float
     base: tuple[float, float, float]
+    harmonics: list[Harmonic]
     gravity: float
 
     @classmethod
@@ -200,7 +208,7 @@ class _Motion:
         base = tuple(_value(values, f"excitation.{name}") for name in ("amplitude_x", "amplitude_y", "phase"))
         return cls(
             pieces, angles, _Body.read(values, n), shaft_mass, nu, (base[0], base[1], base[2]),
-            _value(values, "gravity"),
+            harmonics(values, 1), _value(values, "gravity"),
         )  # fmt: skip
 
     def after(self, start: float) -> "_Motion":
@@ -208,7 +216,7 @@ class _Motion:
         kept = self.pieces.between(start, math.inf)
         return _Motion(
             kept, self.angles[len(self.angles) - len(kept.length) :], self.bodies, self.shaft_mass, self.nu, self.base,
-            self.gravity,
+            self.harmonics, self.gravity,
         )  # fmt: skip
 
     @property
@@ -222,14 +230,8 @@ class _Motion:
         length = pieces.length[steps][:, np.newaxis]
         fraction = (pieces.start - pieces.whole)[steps][:, np.newaxis] + x * length * (self.nu / (2.0 * math.pi))
         turned = 2.0 * math.pi * fraction
-        d, b, chi = self.base
-        sin_chi, cos_chi = (np.full_like(x, float(f(chi))) for f in (elementary.sin, elementary.cos))
-        square = self.nu * self.nu
-        amplitudes = np.full_like(x, d * square), np.full_like(x, b * square)
-        nu = np.full_like(x, self.nu)
-        (ax, jerk_x), (ay, jerk_y) = base_series(
-            *amplitudes, nu, elementary.sin(turned), elementary.cos(turned), sin_chi, cos_chi
-        )
+        velocity, acceleration = self._base(turned)
+        ax, ay = acceleration
         speed = polynomials(pieces.speeds[steps].swapaxes(0, 1), x)
         torque = polynomials(pieces.torques[steps].swapaxes(0, 1), x)
         angle = self.angles[steps].T[:, :, np.newaxis] + length * _primitives(pieces.speeds[steps].swapaxes(0, 1), x)
@@ -240,10 +242,9 @@ class _Motion:
         )
         gained = free - torque / bodies.inertia
         swing = np.square(speed)
-        velocity = -jerk_x / square, -jerk_y / square
         return _Instant(
             velocity,
-            (ax, ay),
+            acceleration,
             angle,
             -bodies.mass * ax + bodies.moment * (gained * cos - swing * sin),
             -bodies.mass * (ay + self.gravity) + bodies.moment * (gained * sin + swing * cos),
@@ -253,6 +254,26 @@ class _Motion:
             ),
             polynomials(pieces.speed[steps], x),
         )
+
+    def _base(self, turned: Floats) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
+        """Velocity and acceleration of the base in x and y where its vibration has turned by an angle in rad."""
+        d, b, chi = self.base
+        sin_chi, cos_chi = (np.full_like(turned, float(f(chi))) for f in (elementary.sin, elementary.cos))
+        square = self.nu * self.nu
+        amplitudes = np.full_like(turned, d * square), np.full_like(turned, b * square)
+        nu = np.full_like(turned, self.nu)
+        (ax, jerk_x), (ay, jerk_y) = base_series(
+            *amplitudes, nu, elementary.sin(turned), elementary.cos(turned), sin_chi, cos_chi
+        )
+        vx, vy = -jerk_x / square, -jerk_y / square
+        for order, x, phase_x, y, phase_y in self.harmonics:
+            rate = order * self.nu
+            along_x, along_y = order * turned + phase_x, order * turned + phase_y
+            vx = vx - rate * x * elementary.sin(along_x)
+            vy = vy + rate * y * elementary.cos(along_y)
+            ax = ax - rate * rate * x * elementary.cos(along_x)
+            ay = ay - rate * rate * y * elementary.sin(along_y)
+        return (vx, vy), (ax, ay)
 
     def on_table(self, now: _Instant) -> tuple[Floats, Floats]:
         """Force in N of all pendulums and of the shaft on the table, in x and y."""

@@ -28,6 +28,19 @@ def base_series(
     return x, y
 
 
+def harmonic_series(
+    x_cos: _Value, x_sin: _Value, y_cos: _Value, y_sin: _Value, rate: _Value, sin: _Value, cos: _Value
+) -> tuple[_Pair[_Value], _Pair[_Value]]:
+    """First two coefficients of the acceleration of the base by one of its harmonics in x and y.
+
+    The acceleration is ``x_cos cos + x_sin sin`` in m/s^2, and likewise in y; ``sin`` and ``cos`` are those of the
+    harmonic's angle, which grows by ``rate`` in rad/s.
+    """
+    x = (x_cos * cos + x_sin * sin, rate * (x_sin * cos - x_cos * sin))
+    y = (y_cos * cos + y_sin * sin, rate * (y_sin * cos - y_cos * sin))
+    return x, y
+
+
 def drive(x: Sequence[_Value], y: Sequence[_Value], sin: Sequence[_Value], cos: Sequence[_Value], k: int) -> _Value:
     """Coefficient k of the base's drive x'' cos phi + y'' sin phi in m/s^2, from the series of its factors."""
     if k == 0:

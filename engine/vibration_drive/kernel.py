@@ -1,6 +1,6 @@
 """The generated kernel: straight-line code for one shape of machine, stored with its machine code in a per-user cache.
 
-One module per (pendulums, clutch coefficients, terms of the load, order, lanes).
+One module per (pendulums, clutch coefficients, terms of the load, harmonics of the base, order, lanes).
 """
 
 import importlib.util
@@ -24,7 +24,14 @@ from sprag_study.engine.taylor.batch import ROWS, SLOTS, peaks_loop, roots_loop
 from sprag_study.engine.taylor.straight import same_everywhere
 from sprag_study.engine.vibration_drive.advance import advance_loop
 from sprag_study.engine.vibration_drive.bounds import bounds_loop
-from sprag_study.engine.vibration_drive.cases import coefficient_count, has_curve, has_drag, has_table, pendulum_count
+from sprag_study.engine.vibration_drive.cases import (
+    coefficient_count,
+    harmonic_room,
+    has_curve,
+    has_drag,
+    has_table,
+    pendulum_count,
+)
 from sprag_study.engine.vibration_drive.equations import series_loop
 from sprag_study.engine.vibration_drive.layout import Layout, make_layout
 
@@ -212,17 +219,21 @@ def kernel(
     drag: bool = False,
     curved: bool = False,
     tabled: bool = False,
+    harmonics: int = 0,
 ) -> Kernel:
     """The kernel of one shape, generated or loaded from the cache.
 
     ``drag``: with torques that depend on speeds; ``curved``: with loads that are no polynomials of the speed, too;
-    ``tabled``: with a load that is a table over it besides.
+    ``tabled``: with a load that is a table over it besides; ``harmonics``: with as many harmonics of the base.
     """
     terms = "_tabled" if tabled else "_curved" if curved else "_drag" if drag else ""
+    terms += f"_h{harmonics}" if harmonics else ""
     name = f"drive_n{pendulums}_c{coefficients}_p{order}_l{lanes}{terms}"
     path = cache_folder() / f"{name}.py"
     if not path.exists():
-        layout = make_layout(pendulums, coefficients, order, lanes, drag=drag, curved=curved, tabled=tabled)
+        layout = make_layout(
+            pendulums, coefficients, order, lanes, drag=drag, curved=curved, tabled=tabled, harmonics=harmonics
+        )
         _write(path, source(layout))
     spec = importlib.util.spec_from_file_location(f"sprag_kernels.{name}", path)
     assert spec is not None
@@ -242,8 +253,9 @@ def kernel_of(columns: Mapping[str, ArrayLike], tolerance: float) -> Kernel:
         If the number of pendulums or coefficients is out of range.
     """
     shape = pendulum_count(columns), coefficient_count(columns), order_for(tolerance), lane_count()
-    if has_table(columns):
-        return kernel(*shape, drag=True, curved=True, tabled=True)
-    if has_curve(columns):
-        return kernel(*shape, drag=True, curved=True)
-    return kernel(*shape, drag=True) if has_drag(columns) else kernel(*shape)
+    tabled = has_table(columns)
+    curved = tabled or has_curve(columns)
+    drag, harmonics = curved or has_drag(columns), harmonic_room(columns)
+    terms = {"drag": drag, "curved": curved, "tabled": tabled, "harmonics": harmonics}
+    # What is not there is left out, so that a kernel is the one of its shape alone.
+    return kernel(*shape, **{name: value for name, value in terms.items() if value})

@@ -15,11 +15,13 @@ from sprag_study.engine.vibration_drive.advance import ANGLE_BOUND, SPEED_BOUND,
 from sprag_study.engine.vibration_drive.automaton import Clutch, Shaft
 from sprag_study.engine.vibration_drive.bounds import TOO_LONG
 from sprag_study.engine.vibration_drive.cases import (
+    HARMONIC_COLUMNS,
     PENDULUM_COLUMNS,
     STOPS,
     TABLE_SPEEDS,
     TABLE_TORQUES,
     Column,
+    HarmonicColumn,
     PendulumColumn,
     stop_column,
 )
@@ -51,6 +53,10 @@ _DIVERGED = ENDINGS.index(Ending.DIVERGED)
 _RUNNING = -1
 
 _NU, _PERIOD, _ACC_X, _ACC_Y = int(Column.NU), int(Column.PERIOD), int(Column.ACC_X), int(Column.ACC_Y)
+_VIBRATION_X, _VIBRATION_Y = int(Column.VIBRATION_X), int(Column.VIBRATION_Y)
+_HIGHEST_ORDER = int(Column.HIGHEST_ORDER)
+_ORDER, _X_COS, _X_SIN = int(HarmonicColumn.ORDER), int(HarmonicColumn.X_COS), int(HarmonicColumn.X_SIN)
+_Y_COS, _Y_SIN = int(HarmonicColumn.Y_COS), int(HarmonicColumn.Y_SIN)
 _CHI, _GRAVITY, _LOAD, _INERTIA = int(Column.CHI), int(Column.GRAVITY), int(Column.LOAD), int(Column.INERTIA)
 _BEARING, _LINEAR, _QUADRATIC = int(Column.BEARING), int(Column.LINEAR), int(Column.QUADRATIC)
 _STRIBECK, _STRIBECK_RATE = int(Column.STRIBECK), int(Column.STRIBECK_RATE)
@@ -72,6 +78,16 @@ def _load_shaft(W: Floats, lay: Layout, lane: int, row: Floats) -> None:
     W[lay.acc_y, lane] = row[_ACC_Y]
     W[lay.cos_chi, lane] = cosine(row[_CHI])
     W[lay.sin_chi, lane] = sine(row[_CHI])
+    W[lay.vibration_x, lane] = row[_VIBRATION_X]
+    W[lay.vibration_y, lane] = row[_VIBRATION_Y]
+    W[lay.highest_order, lane] = row[_HIGHEST_ORDER]
+    for k in range(lay.harmonics):
+        column = _FIRST_PENDULUM + lay.n * (PENDULUM_COLUMNS + lay.coefficients) + k * HARMONIC_COLUMNS
+        W[lay.harmonic_order + k, lane] = row[column + _ORDER]
+        W[lay.harmonic_x_cos + k, lane] = row[column + _X_COS]
+        W[lay.harmonic_x_sin + k, lane] = row[column + _X_SIN]
+        W[lay.harmonic_y_cos + k, lane] = row[column + _Y_COS]
+        W[lay.harmonic_y_sin + k, lane] = row[column + _Y_SIN]
     W[lay.gravity, lane] = row[_GRAVITY]
     W[lay.load, lane] = row[_LOAD]
     W[lay.linear, lane] = row[_BEARING] + row[_LINEAR]

@@ -53,6 +53,8 @@ class Layout(NamedTuple):
     curved: int
     # whether the load has a table over the speed (`parameters.LOAD_TABLE`): 0 or 1, with curved only
     tabled: int
+    # harmonics of the base vibration that the kernel has room for
+    harmonics: int
     order: int
     lanes: int
     rows: int
@@ -72,6 +74,16 @@ class Layout(NamedTuple):
     acc_y: int
     cos_chi: int
     sin_chi: int
+    # largest accelerations of the base in x and y, or more; the highest order of its harmonics, 1 without; of each
+    # harmonic its order, and factors of cosine and sine of its phase in the acceleration, in x and in y
+    vibration_x: int
+    vibration_y: int
+    highest_order: int
+    harmonic_order: int
+    harmonic_x_cos: int
+    harmonic_x_sin: int
+    harmonic_y_cos: int
+    harmonic_y_sin: int
     gravity: int
     load: int
     backstop: int
@@ -270,15 +282,17 @@ def make_layout(
     drag: bool = False,
     curved: bool = False,
     tabled: bool = False,
+    harmonics: int = 0,
 ) -> Layout:
     """Lay out the rows for ``n`` pendulums, that many clutch coefficients, series of that order, and that many lanes.
 
     ``drag``: for torques that depend on speeds too; ``curved``: for a load that is no polynomial of the speed besides;
-    ``tabled``: for one that is a table over it, and for all of these.
+    ``tabled``: for one that is a table over it, and for all of these; ``harmonics``: with room for as many of the base.
     """
     sizes = dict.fromkeys(("speed", "p_speed", "p_torque"), order + 1)
     sizes["curve"] = order + 1 if curved or tabled else 1
     sizes |= dict.fromkeys(("table_speed", "table_torque"), MAX_LOAD_ROWS if tabled else 1)
+    sizes |= dict.fromkeys((name for name in Layout._fields if name.startswith("harmonic_")), harmonics)
     sizes |= {"p_drive": order, "p_law": coefficients, "p_force": coefficients}
     names = Layout._fields[Layout._fields.index("stride") + 1 :]
     fields: dict[str, int] = {}
@@ -291,7 +305,9 @@ def make_layout(
             fields[name] = shaft_rows
             shaft_rows += sizes.get(name, 1)
     terms = int(drag or curved or tabled), int(curved or tabled), int(tabled)
-    return Layout(n, coefficients, *terms, order, lanes, shaft_rows + n * stride, shaft_rows, stride, **fields)
+    return Layout(
+        n, coefficients, *terms, harmonics, order, lanes, shaft_rows + n * stride, shaft_rows, stride, **fields
+    )
 
 
 def as_record(layout: Layout) -> Layout:

@@ -14,7 +14,13 @@ from sprag_study.engine.compile.jit import inlined, part
 from sprag_study.engine.elementary.angles import cosine, sine
 from sprag_study.engine.elementary.powers import exponential
 from sprag_study.engine.vibration_drive.automaton import Band
-from sprag_study.engine.vibration_drive.formulas import base_series, drive, free_acceleration, resistance
+from sprag_study.engine.vibration_drive.formulas import (
+    base_series,
+    drive,
+    free_acceleration,
+    harmonic_series,
+    resistance,
+)
 from sprag_study.engine.vibration_drive.layout import Layout
 from sprag_study.engine.vibration_drive.states import (
     ENGAGED,
@@ -53,7 +59,7 @@ _T_LOW, _T_HIGH = int(Band.T_LOW), int(Band.T_HIGH)
 
 
 _base_series, _drive, _free_acceleration = inlined(base_series), inlined(drive), inlined(free_acceleration)
-_resistance = inlined(resistance)
+_resistance, _harmonic_series = inlined(resistance), inlined(harmonic_series)
 
 
 @part
@@ -72,6 +78,21 @@ def _coefficient(W: Floats, lay: Layout, lane: int, i: int, k: int, rate: float)
         W[lay.sin_chi, lane],
         W[lay.cos_chi, lane],
     )
+    for j in range(lay.harmonics):
+        order = W[lay.harmonic_order + j, lane]
+        turns = order * W[lay.f, lane]
+        theta = 2.0 * math.pi * (turns - math.floor(turns))
+        further_x, further_y = _harmonic_series(
+            W[lay.harmonic_x_cos + j, lane],
+            W[lay.harmonic_x_sin + j, lane],
+            W[lay.harmonic_y_cos + j, lane],
+            W[lay.harmonic_y_sin + j, lane],
+            order * W[lay.nu, lane],
+            sine(theta),
+            cosine(theta),
+        )
+        x = (x[0] + further_x[0], x[1] + further_x[1])
+        y = (y[0] + further_y[0], y[1] + further_y[1])
     phi = (W[base + lay.p_phi, lane], W[base + lay.p_speed, lane])
     w = (phi[1], rate)
     s, c = sine(phi[0]), cosine(phi[0])
@@ -114,7 +135,7 @@ def _moments(W: Floats, lay: Layout, lane: int, i: int) -> float:
     """Size in N*m of the moments on pendulum ``i`` without its clutch; they may cancel, and the base's may be 0 now."""
     base = lay.pendulums + i * lay.stride
     phi, w = W[base + lay.p_phi, lane], W[base + lay.p_speed, lane]
-    vibration = W[lay.acc_x, lane] + W[lay.acc_y, lane]
+    vibration = W[lay.vibration_x, lane] + W[lay.vibration_y, lane]
     driven = abs(W[base + lay.p_ml, lane]) * (vibration + W[lay.gravity, lane] * abs(sine(phi)))
     restoring = W[base + lay.p_spring, lane] * abs(phi) + W[base + lay.p_damping, lane] * abs(w)
     return float(W[base + lay.p_inertia, lane] * (driven + restoring))

@@ -26,6 +26,12 @@ CURVE = frozenset({"stribeck_load", "stribeck_speed", "cyclic_load", "load_cycle
 LOAD_TABLE = "shaft.load_table."
 #: Factor of the torques of that table.
 LOAD_FACTOR = "shaft.load_factor"
+#: Beginning of the paths of the harmonics of the base vibration, each at its place in their list.
+HARMONICS = "excitation.harmonics."
+#: Factor of the amplitudes of all harmonics.
+HARMONIC_FACTOR = "excitation.harmonic_factor"
+#: Most harmonics of a base vibration, and the highest order of one.
+MAX_HARMONICS, MAX_HARMONIC_ORDER = 16, 64
 #: A load that swings with the angle of the shaft, for runs of a given time only.
 CYCLIC = "shaft.cyclic_load"
 #: A load that falls with the speed, and the speed at which it does.
@@ -37,8 +43,10 @@ RATINGS = frozenset(
 )
 #: What belongs to a load that is given as a table.
 TABLE = frozenset({"load_factor"})
+#: What belongs to a base vibration with harmonics.
+HARMONIC = frozenset({"harmonic_factor"})
 #: Parameters that a study has only where they are given: studies from before they existed keep their cases.
-ONLY_GIVEN = START_STATES | DRAG | CURVE | TABLE | RATINGS
+ONLY_GIVEN = START_STATES | DRAG | CURVE | TABLE | HARMONIC | RATINGS
 
 _PARAMETERS = (
     Parameter("gravity", "g", "m/s^2", 0.0, 1e3, False, STANDARD_GRAVITY, "gravitational acceleration"),
@@ -46,6 +54,16 @@ _PARAMETERS = (
     Parameter("excitation.amplitude_x", "d", "m", 0.0, 10.0, False, 0.0, "horizontal amplitude of the base"),
     Parameter("excitation.amplitude_y", "b", "m", 0.0, 10.0, False, 0.0, "vertical amplitude of the base"),
     Parameter("excitation.phase", "chi", "rad", -1e3, 1e3, False, 0.0, "phase of the vertical against the horizontal"),
+    Parameter(
+        HARMONIC_FACTOR,
+        "k_h",
+        "1",
+        0.0,
+        1e6,
+        False,
+        1.0,
+        "factor of the amplitudes of all harmonics of the base",
+    ),
     Parameter("pendulums.N.inertia", "J", "kg*m^2", 0.0, 1e6, True, None, "inertia about the axis"),
     Parameter("pendulums.N.mass", "M", "kg", 0.0, 1e6, False, None, "mass"),
     Parameter("pendulums.N.arm", "l", "m", -1e3, 1e3, False, None, "axis to centre of mass; negative: hangs down"),
@@ -293,6 +311,23 @@ LOAD_TABLE_SPEED = Parameter(
 )
 LOAD_TABLE_TORQUE = Parameter(
     f"{LOAD_TABLE}K.torque", "M_K", "N*m", 0.0, 1e9, False, None, "load torque in a row of its table over the speed"
+)
+#: One harmonic of the base vibration; ``K`` counts from 0.
+HARMONIC_PARAMETERS = (
+    Parameter(
+        f"{HARMONICS}K.order",
+        "m_K",
+        "1",
+        1.0,
+        float(MAX_HARMONIC_ORDER),
+        False,
+        None,
+        "order of a harmonic of the base: its frequency over that of the vibration, a whole number",
+    ),
+    Parameter(f"{HARMONICS}K.amplitude_x", "d_K", "m", 0.0, 10.0, False, 0.0, "horizontal amplitude of a harmonic"),
+    Parameter(f"{HARMONICS}K.phase_x", "alpha_K", "rad", -1e3, 1e3, False, 0.0, "phase of a harmonic along x"),
+    Parameter(f"{HARMONICS}K.amplitude_y", "b_K", "m", 0.0, 10.0, False, 0.0, "vertical amplitude of a harmonic"),
+    Parameter(f"{HARMONICS}K.phase_y", "beta_K", "rad", -1e3, 1e3, False, 0.0, "phase of a harmonic along y"),
 )
 #: Coefficients of the clutch polynomial (docs/theory.md); ``K`` counts from 0, so K = 0 is c_1. Unit N*m/rad^K.
 CLUTCH_COEFFICIENT = Parameter(

@@ -15,6 +15,7 @@ from sprag_study.engine.run import Run, SettledRun
 from sprag_study.engine.vibration_drive.automaton import Clutch, Shaft
 from sprag_study.engine.vibration_drive.cases import (
     case_matrix,
+    harmonics,
     has_table,
     load_table,
     pendulum_count,
@@ -25,7 +26,7 @@ from sprag_study.engine.vibration_drive.characteristics import characteristics
 from sprag_study.engine.vibration_drive.integration import Integration, integrate
 from sprag_study.engine.vibration_drive.kernel import kernel_of, order_for
 from sprag_study.engine.vibration_drive.layout import OUT_ENDING, PendulumSample, ShaftSample, pendulum_samples
-from sprag_study.engine.vibration_drive.parameters import LOAD_TABLE, PARAMETERS
+from sprag_study.engine.vibration_drive.parameters import HARMONICS, LOAD_TABLE, PARAMETERS
 
 Floats = NDArray[np.float64]
 
@@ -155,6 +156,13 @@ def sampled(values: Mapping[str, float], matrix: Floats, found: Integration, tim
         "base.displacement_y": value["excitation.amplitude_y"]
         * elementary.sin(nu * times_done + value["excitation.phase"]),
     }
+    for harmonic in harmonics(values, 1):
+        turned = harmonic.order * nu * times_done
+        for axis, part in (
+            ("x", harmonic.amplitude_x * elementary.cos(turned + harmonic.phase_x)),
+            ("y", harmonic.amplitude_y * elementary.sin(turned + harmonic.phase_y)),
+        ):
+            out[f"base.displacement_{axis}"] = out[f"base.displacement_{axis}"] + part
     for column, name in zip(ShaftSample, ("shaft.angle", "shaft.speed", "shaft.acceleration", "torque"), strict=True):
         out[name] = samples[:, column]
     overrunning = [values.get(f"pendulums.{i}.overrunning_damping", 0.0) for i in range(n)]
@@ -223,6 +231,7 @@ def warm_up(
     drag: bool = False,
     curved: bool = False,
     tabled: bool = False,
+    harmonics: int = 0,
 ) -> None:
     """Generate and compile the kernel of a shape, and what settles motions, so that others load them from the cache."""
     from sprag_study.engine.vibration_drive.settle import settle
@@ -234,6 +243,7 @@ def warm_up(
     columns |= {"shaft.bearing_damping": 1.0} if drag else {}
     columns |= {"shaft.stribeck_load": 1.0} if curved else {}
     columns |= {f"{LOAD_TABLE}0.speed": 0.0, f"{LOAD_TABLE}0.torque": 1.0} if tabled else {}
+    columns |= {f"{HARMONICS}{k}.order": 2.0 for k in range(harmonics)}
     # Nothing moves, which is periodic: this runs all steps of the search, down to the means.
     settle(columns, SettledRun(tolerance=tolerance), cases=1)
     simulate(columns, Run(tolerance=tolerance), cases=1)

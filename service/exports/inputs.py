@@ -14,7 +14,7 @@ from sprag_study.service.reading.catalogue import unit_of
 from sprag_study.service.spec.derive import formulas_of
 from sprag_study.service.spec.machine.registry import part_of
 from sprag_study.worker.directions import SWEEP
-from sprag_study.worker.models import LOAD_TABLE
+from sprag_study.worker.models import HARMONICS, LOAD_TABLE
 from sprag_study.worker.models.parameters import parameter_of
 from sprag_study.worker.spread import DRIVE
 
@@ -120,7 +120,7 @@ def _origin(spec: Mapping[str, Any], path: str) -> Origin:
     place: Any = spec.get("base")
     if not isinstance(place, Mapping):
         return ""
-    if path.startswith(LOAD_TABLE):
+    if path.startswith((LOAD_TABLE, HARMONICS)):
         return "given"
     for key in path.split("."):
         if isinstance(place, Mapping) and "data" in place and key in ("coefficients", "windup_limit"):

@@ -156,7 +156,10 @@ class Listed:
         rows: list[list[float]] = []
         for row, cells in zip(given, _settled(given), strict=True):
             if len(cells) != len(columns):
-                row.refuse("wrong-type", "must be a row of two numbers",
+                two = len(columns) == 2
+                row.refuse("wrong-type",
+                           "must be a row of two numbers" if two
+                           else Sentence("must be a row of {count} numbers", count=str(len(columns))),
                            allowed=f"[{', '.join(column.path for column in columns)}]")  # fmt: skip
                 continue
             read = [cell.number(column) for cell, column in zip(cells, columns, strict=True)]

@@ -15,7 +15,7 @@ from sprag_study.service.spec.axes.axes import varied_values
 from sprag_study.service.spec.fields import base_pointer
 from sprag_study.service.spec.report import Report
 from sprag_study.worker.derived import distinct_values, involved
-from sprag_study.worker.models import LOAD_FACTOR, LOAD_TABLE, machine_shaft
+from sprag_study.worker.models import HARMONIC_FACTOR, HARMONICS, LOAD_FACTOR, LOAD_TABLE, machine_shaft
 from sprag_study.worker.models.parameters import parameter_of
 from sprag_study.worker.models.starts import count_of, has_starts
 from sprag_study.worker.study import Axis, Study
@@ -54,7 +54,7 @@ def warn_vibration_drive(report: Report, study: Study) -> None:
                 runs=runs,
             ),
         )
-    if not any(_values(study, f"excitation.amplitude_{axis}").any() for axis in "xy"):
+    if not any(_values(study, f"excitation.amplitude_{axis}").any() or _overtones(study, axis) for axis in "xy"):
         report.warn("nothing-moves", "/base/excitation", Sentence("both amplitudes are 0, so the base does not move"))
     if _values(study, "excitation.frequency").min() < _SLOW:
         slow = Sentence("below {limit}, which is slow for a vibration drive", limit=Amount(_SLOW, "Hz"))
@@ -65,6 +65,10 @@ def warn_vibration_drive(report: Report, study: Study) -> None:
     if LOAD_FACTOR in (*study.base, *study.column_paths) and f"{LOAD_TABLE}0.speed" not in study.base:
         report.warn(
             "no-effect", _place(study, LOAD_FACTOR), Sentence("has no effect: the load is not given as a table")
+        )
+    if HARMONIC_FACTOR in (*study.base, *study.column_paths) and f"{HARMONICS}0.order" not in study.base:
+        report.warn(
+            "no-effect", _place(study, HARMONIC_FACTOR), Sentence("has no effect: the vibration has no harmonics")
         )
     pendulums = sum(path.startswith("pendulums.") and path.endswith(".mass") for path in study.base)
     _upright(report, study, pendulums)
@@ -265,12 +269,21 @@ def _place(study: Study, path: str) -> Place:
     return Place(base_pointer(path))
 
 
+def _overtones(study: Study, axis: str) -> bool:
+    """Whether the base vibrates along an axis with harmonics."""
+    own = (
+        value for path, value in study.base.items() if path.startswith(HARMONICS) and path.endswith(f"amplitude_{axis}")
+    )
+    return any(own)
+
+
 def _upright(report: Report, study: Study, pendulums: int) -> None:
     """Vibration along y alone exerts no torque on a pendulum at rest in the upright position."""
     starts = [f"pendulums.{index}.initial_{name}" for index in range(pendulums) for name in ("angle", "speed")]
     across, along, *starts_at, weight = _columns(study, ["excitation.amplitude_x", "excitation.amplitude_y", *starts])
     across, along, *starts_at = np.broadcast_arrays(across, along, *starts_at)
-    still = (along != 0.0) & (across == 0.0) & ~np.any(starts_at, axis=0)
+    shaken = (along != 0.0) | _overtones(study, "y")
+    still = shaken & (across == 0.0) & (not _overtones(study, "x")) & ~np.any(starts_at, axis=0)
     if still.any():
         report.warn(
             "stays-upright",

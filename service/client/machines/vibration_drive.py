@@ -12,6 +12,18 @@ from sprag_study.service.client.drafts import Quantity, known
 from sprag_study.service.client.machines.studies import Studies
 
 
+class DriveExcitationHarmonics(TypedDict, total=False):
+    """Harmonics beside the vibration: d_K cos(m_K nu t + alpha_K) along x, b_K sin(m_K nu t + beta_K) along y.
+
+    table : Rows of order, amplitude along x (m), phase along x (rad), amplitude along y (m), phase along y (rad).
+    csv : Order, amplitude and phase along x, amplitude and phase along y as the text of a CSV file, headings with units
+        in brackets.
+    """
+
+    table: Sequence[Sequence[Quantity]]
+    csv: str
+
+
 class DriveExcitation(TypedDict, total=False):
     """Fields of excitation.
 
@@ -19,12 +31,17 @@ class DriveExcitation(TypedDict, total=False):
     amplitude_x : Horizontal amplitude of the base (d), m; >= 0 m and <= 10 m.
     amplitude_y : Vertical amplitude of the base (b), m; >= 0 m and <= 10 m.
     phase : Phase of the vertical against the horizontal (chi), rad; >= -1000 rad and <= 1000 rad.
+    harmonic_factor : Factor of the amplitudes of all harmonics of the base (k_h); >= 0 and <= 1e+06.
+    harmonics : Harmonics beside the vibration: d_K cos(m_K nu t + alpha_K) along x, b_K sin(m_K nu t + beta_K) along y;
+        fields table, csv.
     """
 
     frequency: Quantity
     amplitude_x: Quantity
     amplitude_y: Quantity
     phase: Quantity
+    harmonic_factor: Quantity
+    harmonics: DriveExcitationHarmonics
 
 
 class DrivePendulum(TypedDict, total=False):
@@ -186,6 +203,7 @@ class Drive(Studies):
         "excitation.amplitude_x",
         "excitation.amplitude_y",
         "excitation.phase",
+        "excitation.harmonic_factor",
         "pendulums.*.inertia",
         "pendulums.*.mass",
         "pendulums.*.arm",
@@ -243,7 +261,7 @@ class Drive(Studies):
         Parameters
         ----------
         excitation : values
-            Fields frequency, amplitude_x, amplitude_y, phase; needed: frequency.
+            Fields frequency, amplitude_x, amplitude_y, phase, harmonic_factor, harmonics; needed: frequency.
         pendulums : values
             Fields inertia, mass, arm, spring_rate, spring_arm, damping, backlash, clutch_damping, overrunning_damping,
             rated_torque, rated_frequency, rated_speed, fatigue_exponent, initial_angle, initial_speed, initial_windup,

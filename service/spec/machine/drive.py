@@ -17,11 +17,15 @@ from sprag_study.service.spec.machine.shaft_tables import read_csv_rows
 from sprag_study.service.spec.node import Node
 from sprag_study.service.spec.schema.quantity import QUANTITY, required_of
 from sprag_study.worker.models import (
+    HARMONIC_FACTOR,
+    HARMONIC_PARAMETERS,
+    HARMONICS,
     LOAD_FACTOR,
     LOAD_TABLE,
     LOAD_TABLE_SPEED,
     LOAD_TABLE_TORQUE,
     MAX_COEFFICIENTS,
+    MAX_HARMONICS,
     MAX_LOAD_ROWS,
     MAX_PENDULUMS,
     ONLY_GIVEN,
@@ -40,6 +44,8 @@ START: Final = "start"
 _PENDULUMS: Final = "pendulums"
 _SHAFT: Final = "shaft"
 _LOAD_FIELD: Final = "load_table"
+_EXCITATION: Final = "excitation"
+_HARMONICS_FIELD: Final = "harmonics"
 #: A start from the end of a case of a study of the same service.
 START_AT: Final = Record(
     {
@@ -66,15 +72,35 @@ LOAD: Final = Record(
     "load torque over the speed of the shaft, beside the other loads; at its ends it holds beyond them",
     either=("table", "csv"),
 )
+_HARMONIC_ROWS: Final = Listed(
+    "rows", 1, MAX_HARMONICS, "rows of order, amplitude along x (m), phase along x (rad), amplitude along y (m), phase "
+    "along y (rad)",
+    item={"type": "array", "minItems": 5, "maxItems": 5, "items": QUANTITY},
+)  # fmt: skip
+#: Harmonics of the base vibration.
+OVERTONES: Final = Record(
+    {
+        "table": _HARMONIC_ROWS,
+        "csv": {
+            "type": "string",
+            "description": "order, amplitude and phase along x, amplitude and phase along y as the text of a CSV file, "
+            "headings with units in brackets",
+        },
+    },
+    "harmonics beside the vibration: d_K cos(m_K nu t + alpha_K) along x, b_K sin(m_K nu t + beta_K) along y",
+    either=("table", "csv"),
+)
 _WHERE_STARTS = "submission to that service, or `sprag run --db` with its database"
 _PENDULUM_PATH = re.compile(r"pendulums\.([0-9]{1,9})\.(.+)")
 _CLUTCH_PATH = re.compile(r"(?:pendulums\.[0-9]{1,9}\.)?clutch\.(.+)")
 
 
 def _catalogue() -> list[Parameter]:
-    """The parameters of a drive without those of its clutch, and of the table of its load."""
+    """The parameters of a drive without those of its clutch, the table of its load, and its harmonics."""
     return [
-        entry for entry in parameter_catalogue(VIBRATION_DRIVE) if not entry.path.startswith(("clutch.", LOAD_TABLE))
+        entry
+        for entry in parameter_catalogue(VIBRATION_DRIVE)
+        if not entry.path.startswith(("clutch.", LOAD_TABLE, HARMONICS))
     ]
 
 
@@ -89,6 +115,8 @@ def drive_record() -> Record:
         required += [name] if needed else []
         clutch: dict[str, Field] = {"clutch": CLUTCH} if name == _PENDULUMS else {}
         table: dict[str, Field] = {_LOAD_FIELD: LOAD} if name == _SHAFT else {}
+        if name == _EXCITATION:
+            table = {_HARMONICS_FIELD: OVERTONES}
         record = Record({**entries, **clutch, **table}, required=needed)
         fields[name] = Listed("pendulums", 1, MAX_PENDULUMS, item=record) if clutch else entries.get(name, record)
     whole = {**fields, "clutch": CLUTCH, START: START_AT}
@@ -127,6 +155,8 @@ class Drive(Machine):
             )  # fmt: skip
         if path.startswith(LOAD_TABLE.removesuffix(".")):
             return Sentence("a load that is given as a table is not varied row by row: vary {path}", path=LOAD_FACTOR)
+        if path.startswith(HARMONICS.removesuffix(".")):
+            return Sentence("harmonics are not varied one by one: vary {path}", path=HARMONIC_FACTOR)
         clutch_path = _CLUTCH_PATH.fullmatch(path)
         if clutch_path:
             return self._why_not_clutch(path, clutch_path[1])
@@ -172,6 +202,8 @@ def read_drive(base: Node) -> Drive:
             _read_section(base[name], section, name, machine)
             if name == _SHAFT:
                 _read_load(base[name][_LOAD_FIELD], machine)
+            if name == _EXCITATION:
+                _read_harmonics(base[name][_HARMONICS_FIELD], machine)
         elif isinstance(section, Parameter):
             number = base[name].otherwise(section.default).number(section)
             machine.values.update({} if number is None else {name: number})
@@ -224,6 +256,29 @@ def _read_load(node: Node, machine: Drive) -> None:
             return
     for k, row in enumerate(rows):
         machine.values.update({f"{LOAD_TABLE}{k}.{entry.path}": v for entry, v in zip(named, row, strict=True)})
+
+
+def _read_harmonics(node: Node, machine: Drive) -> None:
+    """Read the harmonics of the base vibration, placed under ``HARMONICS``."""
+    form = node.one_of(OVERTONES.either) if node.given and OVERTONES.read(node) else None
+    if form is None:
+        return
+    own, named = node[form], [replace(entry, path=entry.path.rpartition(".")[2]) for entry in HARMONIC_PARAMETERS]
+    rows = read_csv_rows(own, *named) if form == "csv" else _HARMONIC_ROWS.read_rows(own, *named)
+    if not own.sound:
+        return
+    if len(rows) > MAX_HARMONICS:
+        message = plural("has {count} row", "has {count} rows", len(rows))
+        own.refuse("too-many", message, None, allowed=Sentence("at most {high} rows", high=MAX_HARMONICS))
+        return
+    orders = [row[0] for row in rows]
+    for k, order in enumerate(orders):
+        if not order.is_integer() or order in orders[:k]:
+            message = Sentence("must have whole orders, each once: row {row} does not", row=k + 1)
+            own.refuse("invalid-table", message, f"{order:g}", allowed=HARMONIC_PARAMETERS[0].help)
+            return
+    for k, row in enumerate(rows):
+        machine.values.update({f"{HARMONICS}{k}.{entry.path}": v for entry, v in zip(named, row, strict=True)})
 
 
 def _read_pendulums(node: Node, listed: Listed, machine: Drive) -> None:

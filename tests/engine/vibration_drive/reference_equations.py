@@ -77,6 +77,14 @@ class Machine:
         self.period = 1.0 / get("excitation.frequency")
         self.d, self.b = get("excitation.amplitude_x"), get("excitation.amplitude_y")
         self.chi = get("excitation.phase")
+        rows = sorted({path.split(".")[2] for path in columns if path.startswith("excitation.harmonics.")}, key=int)
+        self.overtones = [
+            tuple(
+                get(f"excitation.harmonics.{k}.{name}")
+                for name in ("order", "amplitude_x", "phase_x", "amplitude_y", "phase_y")
+            )
+            for k in rows
+        ]
         self.g = get("gravity", 9.80665)
         self.inertia, self.load = get("shaft.inertia"), get("shaft.load")
         self.bearing, self.linear, self.quadratic = (
@@ -123,7 +131,12 @@ class Machine:
     def base(self, t: Any) -> tuple[Any, Any]:
         """x'' and y'' of (2)."""
         square, (sin, cos) = self.nu**2, sine_and_cosine(t)
-        return -self.d * square * cos(self.nu * t), -self.b * square * sin(self.nu * t + self.chi)
+        x, y = -self.d * square * cos(self.nu * t), -self.b * square * sin(self.nu * t + self.chi)
+        for order, along, phase_x, upright, phase_y in self.overtones:
+            rate = order * self.nu
+            x = x - along * rate**2 * cos(rate * t + phase_x)
+            y = y - upright * rate**2 * sin(rate * t + phase_y)
+        return x, y
 
     def free_moment(self, i: int, t: Any, y: Any) -> Any:
         """J phi'' of (1) without the clutch."""

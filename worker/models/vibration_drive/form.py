@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from typing import Final
 
-from sprag_study.engine.vibration_drive.parameters import MAX_COEFFICIENTS, MAX_LOAD_ROWS, MAX_PENDULUMS
+from sprag_study.engine.vibration_drive.parameters import (
+    MAX_COEFFICIENTS,
+    MAX_HARMONICS,
+    MAX_LOAD_ROWS,
+    MAX_PENDULUMS,
+)
 from sprag_study.worker.models.form import Block, ComponentKind, Form, FormChoice, FormField, Option, Rows
 
 _CLUTCH: Final = FormChoice(
@@ -59,9 +64,18 @@ _LOAD: Final = FormField(
     example="speed [rpm],torque [N*m]\n0,0.05\n200,0.2", lines=5, columns=("speed", "torque"),
 )  # fmt: skip
 
+#: Harmonics of the base vibration.
+_HARMONICS: Final = FormField(
+    "excitation/harmonics/csv", "table", "Harmonics of the vibration",
+    "five columns with headings and units, pasted from a spreadsheet: order, amplitude and phase along x, amplitude "
+    f"and phase along y; at most {MAX_HARMONICS} rows, beside the amplitudes above, which are those of order 1",
+    example="order,x [mm],phase x [deg],y [mm],phase y [deg]\n2,0.2,0,0.3,90\n3,0,0,0.1,45", lines=4,
+    columns=("order", "amplitude_x", "phase_x", "amplitude_y", "phase_y"),
+)  # fmt: skip
+
 FORM: Final = Form(
     parts=(
-        Block("Vibration of the base", (FormField("excitation/*"),)),
+        Block("Vibration of the base", (FormField("excitation/*"), _HARMONICS)),
         Rows(
             "pendulums", "pendulums", 1, MAX_PENDULUMS, "Pendulum {number}", "Add a pendulum", "Remove the last one",
             blocks=(

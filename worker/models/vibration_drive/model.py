@@ -12,13 +12,15 @@ import numpy as np
 
 from sprag_study.engine import Ending, Run, Span
 from sprag_study.engine.catalogue import ResultInfo
-from sprag_study.engine.vibration_drive.cases import has_curve, has_drag, has_table
+from sprag_study.engine.vibration_drive.cases import harmonic_room, has_curve, has_drag, has_table
 from sprag_study.engine.vibration_drive.clutch import ClutchLawError, check_law
 from sprag_study.engine.vibration_drive.load_results import load_infos
 from sprag_study.engine.vibration_drive.parameters import (
     CLUTCH_COEFFICIENT,
     CLUTCH_WINDUP_LIMIT,
     CYCLIC,
+    HARMONIC_PARAMETERS,
+    HARMONICS,
     LOAD_TABLE,
     LOAD_TABLE_SPEED,
     LOAD_TABLE_TORQUE,
@@ -132,6 +134,7 @@ _TABLE_OF_IT: Final = {
     for k, row in enumerate(((0.0, 0.1), (5.0, 0.05), (12.0, 0.2)))
     for name, value in zip(("speed", "torque"), row, strict=True)
 }
+_HARMONIC_OF_IT: Final = {"order": 2.0, "amplitude_x": 2e-4, "phase_x": 0.5, "amplitude_y": 1e-4, "phase_y": 1.0}
 _DRAG_OF_CLUTCHES: Final = {"clutch_damping": 0.05, "overrunning_damping": 1e-4}
 
 _PENDULUM = re.compile(r"pendulums\.(\d+)\.")
@@ -147,7 +150,8 @@ _TABLE: Final = "table"
 
 class DriveKey(NamedTuple):
     """Key of the kernel of a vibration drive; ``drag``: with torques that depend on speeds, ``curved``: with loads that
-    are no polynomials of the speed too, ``tabled``: with loads that are tables over it besides.
+    are no polynomials of the speed too, ``tabled``: with loads that are tables over it besides; ``harmonics``: with
+    room for as many harmonics of the base, a number that then ends the key.
     """
 
     pendulums: int
@@ -156,12 +160,14 @@ class DriveKey(NamedTuple):
     drag: bool = False
     curved: bool = False
     tabled: bool = False
+    harmonics: int = 0
 
     @property
     def shape(self) -> KernelShape:
         """The shape with this key."""
         terms = (_TABLE,) if self.tabled else (_CURVE,) if self.curved else (_DRAG,) if self.drag else ()
-        return KernelShape(MODEL, (*self[:3], *terms))
+        room = (self.harmonics,) if self.harmonics else ()
+        return KernelShape(MODEL, (*self[:3], *terms, *room))
 
 
 def _paths(study: Study) -> Iterable[str]:
@@ -274,7 +280,14 @@ class VibrationDrive(Model):
     presentation = PRESENTATION
 
     def parameters(self) -> tuple[Parameter, ...]:
-        return (*PARAMETERS, LOAD_TABLE_SPEED, LOAD_TABLE_TORQUE, CLUTCH_COEFFICIENT, CLUTCH_WINDUP_LIMIT)
+        return (
+            *PARAMETERS,
+            LOAD_TABLE_SPEED,
+            LOAD_TABLE_TORQUE,
+            *HARMONIC_PARAMETERS,
+            CLUTCH_COEFFICIENT,
+            CLUTCH_WINDUP_LIMIT,
+        )
 
     def variants(self) -> tuple[str, ...]:
         return tuple(
@@ -307,7 +320,9 @@ class VibrationDrive(Model):
         terms = {
             "drag": has_drag(_paths(study)), "curved": has_curve(_paths(study)), "tabled": has_table(_paths(study)),
         }  # fmt: skip
-        return DriveKey(pendulums(study), coefficients(study), run_of(study.run).tolerance, **terms).shape
+        room = harmonic_room(_paths(study))
+        numbers = pendulums(study), coefficients(study), run_of(study.run).tolerance
+        return DriveKey(*numbers, **terms, harmonics=room).shape
 
     def sweeps(self, run: Mapping[str, Any]) -> bool:
         return is_settled(run) and not has_starts(run)
@@ -399,9 +414,12 @@ class VibrationDrive(Model):
     def known_answers(self, shape: KernelShape) -> bytes:
         from sprag_study.engine.vibration_drive.simulate import simulate
 
-        pendulums, coefficients, tolerance, drag, curved, tabled = _key_of(shape)
+        pendulums, coefficients, tolerance, drag, curved, tabled, harmonics = _key_of(shape)
         columns = _DRIVEN | (_DRAG_OF_IT if drag else {}) | (_CURVE_OF_IT if curved else {})
         columns |= _TABLE_OF_IT if tabled else {}
+        for number in range(harmonics):
+            columns |= {f"{HARMONICS}{number}.{name}": value for name, value in _HARMONIC_OF_IT.items()}
+            columns[f"{HARMONICS}{number}.order"] = 2.0 + number
         swinging = _PENDULUM_OF_IT | (_DRAG_OF_CLUTCHES if drag else {})
         for number in range(pendulums):
             columns |= {f"pendulums.{number}.{name}": value for name, value in swinging.items()}
@@ -518,7 +536,9 @@ def _is_law(law: NDArray[np.float64]) -> bool:
 
 
 def _key_of(shape: KernelShape) -> DriveKey:
-    terms = shape.key[3:]
+    room = [part for part in shape.key[3:] if isinstance(part, int)]
+    terms = tuple(part for part in shape.key[3:] if isinstance(part, str))
     numbers = cast("tuple[int, int, float]", shape.key[:3])
     curved = terms in {(_CURVE,), (_TABLE,)}
-    return DriveKey(*numbers, drag=curved or terms == (_DRAG,), curved=curved, tabled=terms == (_TABLE,))
+    drag, tabled = curved or terms == (_DRAG,), terms == (_TABLE,)
+    return DriveKey(*numbers, drag=drag, curved=curved, tabled=tabled, harmonics=sum(room))

@@ -12,8 +12,10 @@ import pytest
 from sprag_study.engine.vibration_drive.parameters import CURVE, DRAG
 from sprag_study.worker.limits import MAX_CLUTCH_ROWS
 from sprag_study.worker.models import (
+    HARMONICS,
     LOAD_TABLE,
     MAX_COEFFICIENTS,
+    MAX_HARMONICS,
     MAX_LOAD_ROWS,
     MAX_PENDULUMS,
     ONLY_GIVEN,
@@ -35,7 +37,7 @@ def pendulums(*changes: dict[str, Any]) -> list[dict[str, Any]]:
 
 @pytest.mark.parametrize(
     "entry",
-    [entry for entry in parameter_catalogue("vibration-drive") if not entry.path.startswith(LOAD_TABLE)],
+    [entry for entry in parameter_catalogue("vibration-drive") if not entry.path.startswith((LOAD_TABLE, HARMONICS))],
     ids=lambda entry: entry.path,
 )
 def test_every_parameter_keeps_its_range(entry: Any) -> None:
@@ -56,7 +58,8 @@ def test_every_parameter_keeps_its_range(entry: Any) -> None:
     [
         entry
         for entry in parameter_catalogue("vibration-drive")
-        if not re.search("clutch|windup|load_table", entry.path) and entry.path.rpartition(".")[2] not in ONLY_GIVEN
+        if not re.search("clutch|windup|load_table|harmonics", entry.path)
+        and entry.path.rpartition(".")[2] not in ONLY_GIVEN
     ],
     ids=lambda entry: entry.path,
 )
@@ -327,6 +330,59 @@ def test_a_load_is_a_table_over_the_speed() -> None:
 )  # fmt: skip
 def test_what_is_no_table_of_a_load(table: object, pointer: str, code: str) -> None:
     assert {where: fault.code for where, fault in problems({TABLE: table}).items()} == {pointer: code}
+
+
+OVERTONES = "/base/excitation/harmonics"
+
+
+def test_a_base_has_harmonics() -> None:
+    rows = [[2, "0.2 mm", "30 deg", "0.3 mm", 0], [3, 0, 0, "100 um", "90 deg"]]
+    csv = "order;x [mm];phase x [deg];y [mm];phase y [deg]\n2;0,2;30;0,3;0\n3;0;0;0,1;90\n"
+    studies = [parsed({OVERTONES: given, "/axes": []}).study for given in ({"table": rows}, {"csv": csv})]
+    values = {path: value for path, value in studies[0].base.items() if path.startswith(HARMONICS)}
+    assert studies[1].base == pytest.approx(studies[0].base)
+    assert values["excitation.harmonics.0.phase_x"] == pytest.approx(math.radians(30.0))
+    assert values["excitation.harmonics.1.amplitude_y"] == pytest.approx(1e-4)
+    assert [values[f"excitation.harmonics.{k}.order"] for k in range(2)] == [2.0, 3.0]
+    without = parsed({"/axes": []}).study
+    assert studies[0].base.items() - without.base.items() == values.items()
+    assert shape_of(studies[0]).key == (*shape_of(without).key, 2)
+    factors = {"/axes/2": {"path": "excitation.harmonic_factor", "values": [0, 0.5, 1]}}
+    (warning,) = parsed(factors).warnings
+    assert "no harmonics" in warning
+    assert parsed({**factors, OVERTONES: {"csv": csv}}).warnings == ()
+
+
+def test_a_base_with_harmonics_alone_moves() -> None:
+    still = {"/base/excitation/amplitude_x": 0, "/base/excitation/amplitude_y": 0, "/axes": []}
+    assert "both amplitudes are 0" in " ".join(map(str, parsed(still).warnings))
+    assert parsed({**still, OVERTONES: {"table": [[2, "1 mm", 0, "1 mm", 0]]}}).warnings == ()
+    upright = {OVERTONES: {"table": [[2, 0, 0, "1 mm", 0]]}}
+    assert "stays upright" in " ".join(map(str, parsed({**still, **upright}).warnings))
+
+
+@pytest.mark.parametrize(
+    ("given", "pointer", "code"),
+    [
+        ({"table": [[2, 0, 0, 0, 0], [2, 0, 0, 0, 0]]}, f"{OVERTONES}/table", "invalid-table"),
+        ({"csv": "order,x,a,y,b\n2.5,0,0,0,0\n"}, f"{OVERTONES}/csv", "invalid-table"),
+        ({"table": []}, f"{OVERTONES}/table", "wrong-type"),
+        ({"table": [[2, 0, 0, 0]]}, f"{OVERTONES}/table/0", "wrong-type"),
+        ({"csv": "order,x,a,y,b\n" + "".join(f"{k},0,0,0,0\n" for k in range(1, MAX_HARMONICS + 2))},
+         f"{OVERTONES}/csv", "too-many"),
+        ({"table": [[65, 0, 0, 0, 0]]}, f"{OVERTONES}/table/0/0", "out-of-range"),
+        ({"table": [[2, -1, 0, 0, 0]]}, f"{OVERTONES}/table/0/1", "out-of-range"),
+        ({"table": [[2, 0, 0, 0, 0]], "csv": ""}, OVERTONES, "exactly-one"),
+    ],
+)  # fmt: skip
+def test_what_are_no_harmonics(given: object, pointer: str, code: str) -> None:
+    assert {where: fault.code for where, fault in problems({OVERTONES: given}).items()} == {pointer: code}
+
+
+def test_harmonics_are_not_varied_one_by_one() -> None:
+    given = {OVERTONES: {"table": [[2, 0, 0, "1 mm", 0]]}}
+    axis = {"/axes/2": {"path": "excitation.harmonics.0.amplitude_y", "values": [0.001, 0.002]}}
+    assert "excitation.harmonic_factor" in problems(given | axis)["/axes/2/path"].message
 
 
 def test_rows_of_a_load_are_not_varied() -> None:
