@@ -21,11 +21,11 @@ from sprag_study.service.views.setting import Offered
 from sprag_study.service.views.shown import Column, Shown, ShownTable
 from sprag_study.worker import models
 from sprag_study.worker.models.abilities import has_speeds, run_speeds
-from sprag_study.worker.models.speeds import SteadyCycle, SteadyCycles
 
 if TYPE_CHECKING:
     from sprag_study.service.figures.figure import Figure
     from sprag_study.service.views.shown import Cell
+    from sprag_study.worker.models.speeds import SteadyCycle, SteadyCycles
     from sprag_study.worker.study import Study
 
 _LOADS: Final = Range("1", 0.0, 1e6)
@@ -35,10 +35,10 @@ _COLUMNS: Final = (
     Column(Phrase("Cycle")), Column(Phrase("Comes from above"), "rad/s"), Column(Phrase("and below"), "rad/s"),
 )  # fmt: skip
 
-SpeedsAnswer = CaseAnswer[float, SteadyCycles]
+SpeedsAnswer = CaseAnswer[float, "SteadyCycles"]
 
 
-class SpeedsView(CaseView[SpeedsQuestion, float, SteadyCycles]):
+class SpeedsView(CaseView[SpeedsQuestion, float, "SteadyCycles"]):
     """At which speeds a machine shaft turns steadily, and to which it comes from where."""
 
     about = SPEEDS
