@@ -39,6 +39,7 @@ NAMES: Final = {
     "гон": "gon",
     **dict.fromkeys(("об", "оберт", "оберти", "обертів", "оборот", "оборота", "оборотов"), "rev"),
     "атм": "atm",
+    **dict.fromkeys(("к.с", "л.с"), "PS"),
     # Moments of inertia without the multiplication sign; the power stands behind.
     **{
         f"{gram}{length}": f"{latin_gram}{latin_length}"
@@ -54,10 +55,14 @@ NAMES: Final = {
         ("период", "периода", "периодов", "периоды", "період", "періоду", "періодів", "періоди"), "periods"
     ),
 }
-#: Words, and the pound-force, which has a hyphen.
-_WORD: Final = re.compile("фунт-сил[аиі]?|[А-Яа-яЁёІіЇїЄєҐґ]+")
+#: Words, the pound-force, which has a hyphen, and the metric horsepower, which has points.
+_WORD: Final = re.compile(r"фунт-сил[аиі]?|[кл]\.\s?с(?![А-Яа-яЁёІіЇїЄєҐґ])\.?|[А-Яа-яЁёІіЇїЄєҐґ]+")
 
 
 def latin(text: str) -> str:
     """``text`` with the Latin names of units; words that name no unit stay as they are."""
-    return text if text.isascii() else _WORD.sub(lambda found: NAMES.get(found[0], found[0]), text)
+    return text if text.isascii() else _WORD.sub(_latin_name, text)
+
+
+def _latin_name(found: re.Match[str]) -> str:
+    return NAMES.get("".join(found[0].split()).rstrip("."), found[0])

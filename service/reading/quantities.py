@@ -64,7 +64,7 @@ KINDS: Final = (
     Kind("force", "Force", "N", ("kN", "lbf")),
     Kind("torque", "Torque", "N*m", ("N*mm", "N*cm", "kN*m", "lbf*ft", "lbf*in")),
     Kind("energy", "Energy", "J", ("mJ", "kJ")),
-    Kind("power", "Power", "W", ("mW", "kW")),
+    Kind("power", "Power", "W", ("mW", "kW", "hp", "PS")),
     Kind("pressure", "Pressure", "Pa", ("kPa", "MPa", "bar")),
     Kind("spring_rate", "Spring rate", "N/m", ("N/mm", "kN/m")),
     Kind("damping", "Damping", "N*m*s/rad", ("N*mm*s/rad",)),

@@ -43,13 +43,14 @@ _CYRILLIC: Final = {
     "W": "Вт",
     "mW": "мВт",
     "kW": "кВт",
+    "PS": "к.с.",
     "Pa": "Па",
     "kPa": "кПа",
     "MPa": "МПа",
     "bar": "бар",
 }
 #: Without a Cyrillic name.
-_LATIN_ONLY: Final = {"1", "%", "g0", "lbf", "lbf*ft", "lbf*in"}
+_LATIN_ONLY: Final = {"1", "%", "g0", "hp", "lbf", "lbf*ft", "lbf*in"}
 _PARAMETERS: Final = {entry.unit.replace("^K", "^2") for name in model_names() for entry in parameter_catalogue(name)}
 _SHOWN: Final = {(unit, kind.unit) for kind in KINDS for unit in (kind.unit, *kind.others)}
 UNITS: Final = sorted(pair for pair in {*_SHOWN, *((unit, unit) for unit in _PARAMETERS)} if pair[0] not in _LATIN_ONLY)
