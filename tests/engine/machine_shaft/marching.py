@@ -108,9 +108,8 @@ def marched(machine: Machine, given: float, energy: Floats, accuracy: float = 1e
         # Comes to rest smoothly; exactly the machine where the accuracy is asked for.
         return value if exact else np.where(value < 0.0, value * np.minimum(kept / rest, 1.0), value)
 
-    least = energy
+    least, scale = energy, accuracy * float(np.max(energy))
     for low, high in pairwise(np.linspace(0.0, TURN, 5)):
-        scale = accuracy * float(np.max(energy))
         course = solve_ivp(rate, (low, high), energy, method="DOP853", rtol=accuracy, atol=1e-3 * scale).y
         least, energy = np.minimum(least, course.min(axis=1)), course[:, -1]
     return energy if exact else np.where(least < 3.0 * rest, 0.0, energy)
