@@ -248,3 +248,16 @@ def test_double_acting_compressor() -> None:
         MachineSpec(parts=both[:1]), {path: v for path, v in numbers.items() if not path.startswith("parts.1")}
     )
     assert found["power.mean"] == pytest.approx(2.0 * single["power.mean"], rel=1e-12)
+
+
+@pytest.mark.parametrize("back", [0.0, 1e5])
+def test_two_ends_with_clearance_take_their_indicated_work_over_the_efficiency(back: float) -> None:
+    """Two ends, clearance 6 %, 1 to 6.5 bar, n = 1.3, efficiency 0.8, against the closed form of the work."""
+    clearance, ratio, n, swept = 0.06, 6.5, 1.3, 0.01
+    drawn = swept * (1.0 + clearance - clearance * ratio ** (1.0 / n))
+    work = 2.0 * n / (n - 1.0) * 1e5 * drawn * (ratio ** ((n - 1.0) / n) - 1.0)
+    numbers = compressor(swept, 400.0, (1e5, ratio * 1e5), n, ends=2)
+    own = {"gas.clearance": clearance, "gas.back_pressure": back, "efficiency": 0.8}
+    numbers |= {f"parts.{k}.operation.{name}": value for k in range(2) for name, value in own.items()}
+    end = PartChoice(MechanismChoice("slider_crank"), OperationChoice("gas", efficiency_is="work"))
+    assert one(MachineSpec(parts=(end, end)), numbers)["work.resistance"] == pytest.approx(-work / 0.8, rel=1e-11)
