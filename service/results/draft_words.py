@@ -76,8 +76,8 @@ def _ends(study: Study) -> str:
     if not study.run:
         return ""
     if study.run.get("until") == SETTLED:
-        return gettext(", each until its motion is settled")
+        return gettext(", run until the motion is settled")
     time = study.run.get("duration")
     if time is None:
         return ""
-    return gettext(", each for {time}", time=f"{number(float(time[0]), _DIGITS)} {gettext(time[1])}")
+    return gettext(", run for {time}", time=f"{number(float(time[0]), _DIGITS)} {gettext(time[1])}")

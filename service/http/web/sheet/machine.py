@@ -26,7 +26,7 @@ from sprag_study.worker import models
 from sprag_study.worker.models.formulas import evaluate
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from sprag_study.service.figures.drawing import Drawing
     from sprag_study.service.reading.reader import Reading
@@ -63,7 +63,7 @@ def machine_of(
         for path, stated in given.items()
         if stated and path not in placed
     ]
-    return Machine(tuple(_drawn(drawing, links, label) for drawing in every), tuple(others))
+    return Machine(tuple(_drawn(every, links, label)), tuple(others))
 
 
 def drawings_of_case(
@@ -75,8 +75,7 @@ def drawings_of_case(
     def label(path: str) -> str:
         return reading.say(joined("", [Amount(shown.base[path], unit_of(study, path), DIMENSION_DIGITS)]))
 
-    links = _links(_given(shown, spec), variant)
-    return [_drawn(drawing, links, label) for drawing in drawings(shown, width=_WIDTH)]
+    return list(_drawn(drawings(shown, width=_WIDTH), _links(_given(shown, spec), variant), label))
 
 
 def _given(study: Study, spec: Mapping[str, Any]) -> dict[str, bool]:
@@ -93,9 +92,32 @@ def _links(paths: Iterable[str], variant: str) -> dict[str, str]:
     return {path: f"{variant}#{base_pointer(path)}" for path in paths}
 
 
-def _drawn(drawing: Drawing, links: Mapping[str, str], label: Callable[[str], str]) -> Markup:
-    labels = {each.path: label(each.path) for each in drawing.dimensions}
-    return Markup(svg(replace(drawing, about=gettext(drawing.about)), labels, links))  # noqa: S704 - texts are escaped
+def _drawn(every: Iterable[Drawing], links: Mapping[str, str], label: Callable[[str], str]) -> Iterator[Markup]:
+    """Drawings with their values; a part that is like one before it has only those in which it differs."""
+    first: dict[tuple[str, ...], tuple[int, dict[str, str]]] = {}
+    for drawing in every:
+        labels, like = {each.path: label(each.path) for each in drawing.dimensions}, ""
+        part = _part_of(drawing.at)
+        if part is not None:
+            within = {path.removeprefix(drawing.at): text for path, text in labels.items()}
+            before, known = first.setdefault(tuple(within), (part, within))
+            if before != part:
+                labels = {f"{drawing.at}{name}": text for name, text in within.items() if known[name] != text}
+                like = Markup('<p class="soft">{}</p>').format(_like(part + 1, before + 1, same=not labels))
+        picture = svg(replace(drawing, about=gettext(drawing.about)), labels, links)
+        yield Markup(picture) + like  # noqa: S704 - texts are escaped
+
+
+def _like(part: int, first: int, *, same: bool) -> str:
+    if same:
+        return gettext("Part {number}, like part {first}", number=part, first=first)
+    return gettext("Part {number}, otherwise like part {first}", number=part, first=first)
+
+
+def _part_of(at: str) -> int | None:
+    """The index of the part of a machine that a drawing shows; None where it shows the whole machine."""
+    first, _, rest = at.partition(".")
+    return int(rest.partition(".")[0]) if first == "parts" else None
 
 
 def _whole(study: Study, best: Mapping[str, float]) -> dict[str, float]:

@@ -36,7 +36,7 @@ def test_the_draft_in_words() -> None:
     text = words(values_of(SPEC))
     assert text == (
         "3 axes: excitation frequency 16 to 35 Hz (16 values), horizontal amplitude = vertical amplitude "
-        "1 to 3 mm (4 values), load torque 0.02 to 0.3 N·m (3 values); 192 cases, each for 60 periods."
+        "1 to 3 mm (4 values), load torque 0.02 to 0.3 N·m (3 values); 192 cases, run for 60 periods."
     )
     codes = words(values_of(SPEC), Choice("frequency=rpm,mm", "codes"))
     assert "excitation.frequency 960 to 2100 rpm (16 values)" in codes
@@ -45,7 +45,7 @@ def test_the_draft_in_words() -> None:
 @pytest.mark.parametrize(
     ("preset", "expected"),
     [
-        ("one_pendulum", "each until its motion is settled"),
+        ("one_pendulum", "run until the motion is settled"),
         ("refined_characteristic", "(refined); at most "),
         ("tolerances", "each place with the nominal machine and 256 drawn ones"),
         ("fastest_drive", "The best designs by "),

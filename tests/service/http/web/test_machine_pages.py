@@ -122,6 +122,21 @@ def test_the_drawing_of_a_best_design_has_its_operating_points(service: Service)
     assert values == {"Inertia of the drive": "57 kg·m²", "Mean speed": "100…140 rpm"}
 
 
+def test_parts_that_are_alike_have_their_values_once(service: Service) -> None:
+    spec = preset("four_cylinder_engine")
+    spec["base"]["parts"][2]["mechanism"]["slider_crank"]["crank"] = "35 mm"
+    study_id = service.submit(spec)
+    study, reading = service.store.studies.study(study_id), reading_of(service.store, study_id, Choice("workshop"))
+    drawn = machine_of(study, service.store.studies.spec(study_id), reading, {}, "/new?clone=it").drawings
+    values = [re.findall(r"= ?</tspan>([^<]+)|</tspan>([0-9][^<]*)", drawing) for drawing in drawn]
+    assert [drawing.partition("</svg>")[2] for drawing in drawn] == [
+        "", *(f'<p class="soft">{text}</p>' for text in (
+            "Part 2, like part 1", "Part 3, otherwise like part 1", "Part 4, like part 1"
+        )),
+    ]  # fmt: skip
+    assert [len(each) for each in values] == [7, 0, 1, 0]
+
+
 def test_a_name_that_ends_with_a_number_is_apart_from_its_value(service: Service) -> None:
     study_id = computed(service, preset("slotter"))
     assert "Curve: resistance in step 1 = 4000 N" in page(service, f"/studies/{study_id}")
