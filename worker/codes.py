@@ -53,6 +53,7 @@ FLAG_MASKS: Final[dict[str, int]] = {
     "arbitrary_start": 1 << 5,
     "restarted": 1 << 6,
     "history_dependent": 1 << 7,
+    "sensitive_start": 1 << 8,
 }
 
 

@@ -18,6 +18,7 @@ from sprag_study.engine.vibration_drive.orbits import distances, settling_period
 from sprag_study.engine.vibration_drive.regimes import Regime, means, settled_infos, winding
 from sprag_study.engine.vibration_drive.results import STEADY_SHAFT, result_infos
 from sprag_study.engine.vibration_drive.search import LONG, ROUND, RUNS, Orbits, Search, joined, transient_rounds
+from sprag_study.engine.vibration_drive.sensitive_starts import sensitive
 from sprag_study.engine.vibration_drive.slow import march
 from sprag_study.engine.vibration_drive.strobes import (
     ANGLE,
@@ -67,6 +68,8 @@ class SettledBatch:
         State at a strobe on the orbit, or where the search ended, from which it can be continued.
     spent : array, shape (cases,)
         Total excitation periods computed for each case, including disturbed runs.
+    sensitive : bool array, shape (cases,), or None
+        Whether a sensitive transient decided the motion of each case; None where that was not asked for.
     """
 
     values: Floats
@@ -74,6 +77,7 @@ class SettledBatch:
     regimes: NDArray[np.int8]
     points: Floats
     spent: Floats
+    sensitive: NDArray[np.bool_] | None = None
 
     @property
     def repeats(self) -> NDArray[np.bool_]:
@@ -101,13 +105,16 @@ class SettledBatch:
     def of_case(self, case: int) -> "SettledBatch":
         """The batch with one of the cases only."""
         rows = slice(case, case + 1)
-        return SettledBatch(*(getattr(self, name)[rows] for name in SettledBatch.__slots__))
+        sensitive = None if self.sensitive is None else self.sensitive[rows]
+        return SettledBatch(
+            self.values[rows], self.endings[rows], self.regimes[rows], self.points[rows], self.spent[rows], sensitive
+        )
 
 
 class _Results:
     """The columns of a batch's results by name, filled as cases are settled."""
 
-    def __init__(self, cases: int, pendulums: int, width: int) -> None:
+    def __init__(self, cases: int, pendulums: int, width: int, *, examined: bool = False) -> None:
         self.names = [info.name for info in settled_infos(pendulums)]
         self.plain = len(result_infos(pendulums))
         self.means = list(means(pendulums))
@@ -115,6 +122,7 @@ class _Results:
         self.regimes = np.zeros(cases, dtype=np.int8)
         self.endings = np.full(cases, _OK, dtype=np.int8)
         self.points = np.full((cases, width), np.nan)
+        self.sensitive = np.zeros(cases, dtype=np.bool_) if examined else None
 
     def column(self, name: str) -> int:
         return self.names.index(name)
@@ -124,7 +132,12 @@ class _Results:
 
 
 def settle(
-    columns: Mapping[str, ArrayLike], settings: SettledRun, *, cases: int, starts: Floats | None = None
+    columns: Mapping[str, ArrayLike],
+    settings: SettledRun,
+    *,
+    cases: int,
+    starts: Floats | None = None,
+    examine_starts: bool = False,
 ) -> SettledBatch:
     """Find the settled motion of each case, from its own start or from a given state.
 
@@ -144,6 +157,8 @@ def settle(
         The state at which each case begins: a row of ``strobes.continued``, whose numbers may come from a case with
         other parameters, or of ``strobes.from_rest`` for its own initial values. A case that begins at a given state
         has no run-up; without a load, ``shaft.speed.from_rest`` is the speed that it reaches from there.
+    examine_starts : bool
+        Whether to find out which motions a sensitive transient decided.
 
     Returns
     -------
@@ -161,16 +176,20 @@ def settle(
     if starts is not None and (starts.shape != (cases, width(n)) or not np.isfinite(starts).all()):
         raise ValueError(f"starts must be finite numbers in the shape {(cases, width(n))}, not {starts.shape}")
     search = Search(module, matrix, settings, given=starts)
-    results = _Results(cases, n, search.starts.shape[1])
+    results = _Results(cases, n, search.starts.shape[1], examined=examine_starts)
     if cases:
         free = unloaded(matrix, n)
         _settle(search, np.flatnonzero(~free), results)
         _unloaded(module, search, np.flatnonzero(free), results)
         results.values[results.endings != _OK] = np.nan
         results.regimes[results.endings != _OK] = Regime.NONE
+        if results.sensitive is not None:
+            results.sensitive &= results.endings == _OK
         settled = np.flatnonzero(results.endings == _OK)
         results.put(settled, "regime", results.regimes[settled])
-    return SettledBatch(results.values, results.endings, results.regimes, results.points, search.spent)
+    return SettledBatch(
+        results.values, results.endings, results.regimes, results.points, search.spent, results.sensitive
+    )
 
 
 def _settle(search: Search, active: Ints, results: _Results) -> None:
@@ -181,6 +200,9 @@ def _settle(search: Search, active: Ints, results: _Results) -> None:
     orbits = joined(found, search)
     if len(orbits.cases):
         _write(search, search.refined(orbits), results)
+        if results.sensitive is not None:
+            plan, count, moves = _rounds(search.settings)
+            results.sensitive[orbits.cases] = sensitive(search, orbits, [*plan, *[ROUND] * count], moves)
     if len(active):
         irregular = batches.finish(active)
         _write_irregular(search, active, irregular, search.starts[active], results)
@@ -244,23 +266,30 @@ def _write_irregular(search: Search, cases: Ints, irregular: Means, points: Floa
     _whole_run(search, cases, results)
 
 
-def _search(search: Search, active: Ints, found: list[Orbits], results: _Results) -> tuple[Batches, Ints]:
-    """Add the orbits that cases come to; the batches of the other cases, and these cases."""
-    settings = search.settings
+def _rounds(settings: SettledRun) -> tuple[list[int], int, int]:
+    """Periods of each round of a search before its batches, the number of batches, and that of the round after which
+    its strobes move; beyond the last one where they do not.
+    """
     count = BATCHES
     if settings.at_most < MEANS_FROM_PERIODS:
         count = max(1, (2 * settings.at_most // 3) // ROUND)
     plan = transient_rounds(settings.at_most - count * ROUND)
-    batches, moved = Batches(search, count), False
+    # Not before the batches: their windows begin at a strobe.
+    late = (number for number in range(len(plan) - 1) if sum(plan[: number + 1]) >= _MOVE_AFTER)
+    return plan, count, next(late, len(plan) + count)
+
+
+def _search(search: Search, active: Ints, found: list[Orbits], results: _Results) -> tuple[Batches, Ints]:
+    """Add the orbits that cases come to; the batches of the other cases, and these cases."""
+    plan, count, moves = _rounds(search.settings)
+    batches = Batches(search, count)
     for number, periods in enumerate(plan):
         if not len(active):
             return batches, active
         search.advance(active, periods, windowed=False)
         active = _take_settled(search, active, found, results)
-        # Not before the batches: their windows begin at a strobe.
-        if not moved and number + 1 < len(plan) and sum(plan[: number + 1]) >= _MOVE_AFTER:
+        if number == moves:
             search.move_strobes(active)
-            moved = True
     for _ in range(count):
         if not len(active):
             break
@@ -346,9 +375,11 @@ def _unloaded(module: Kernel, search: Search, cases: Ints, results: _Results) ->
     free[:, Column.MOST_STEPS] = search.budget[cases] / RUNS
     free[:, Column.SPEED] = _OUT_OF_REACH
     apart = Search(module, free, search.settings, steady_shaft=True)
-    own = _Results(len(cases), module.LAYOUT.n, apart.starts.shape[1])
+    own = _Results(len(cases), module.LAYOUT.n, apart.starts.shape[1], examined=results.sensitive is not None)
     _settle(apart, np.arange(len(cases)), own)
     search.spent[cases] += apart.spent
+    if results.sensitive is not None and own.sensitive is not None:
+        results.sensitive[cases] = own.sensitive
     steps, events = (results.column(name) for name in ("run.steps", "run.events"))
     for row, case in enumerate(cases.tolist()):
         if search.endings[case] != _OK or own.endings[row] != _OK:

@@ -44,6 +44,8 @@ class SettledTurn:
     state : dict or None
         Initial values (SI) that go on from the motion at the start of a period; None where the case did not end ok.
     ending : Ending
+    sensitive : bool array, shape (1,), or None
+        As of the ``SettledBatch``; None for a motion from a given state.
     """
 
     values: Floats
@@ -52,6 +54,7 @@ class SettledTurn:
     motion: Trajectory
     state: dict[str, float] | None
     ending: Ending
+    sensitive: NDArray[np.bool_] | None
 
 
 def settled_turn(
@@ -75,15 +78,16 @@ def settled_turn(
         If a required parameter is missing or the number of pendulums or coefficients is out of range.
     """
     values = scalars(columns)
-    found = settle(values, settings, cases=1, starts=start)
+    found = settle(values, settings, cases=1, starts=start, examine_starts=start is None)
     regime, ending, results = Regime(int(found.regimes[0])), ENDINGS[int(found.endings[0])], found.values[0]
     if ending is not Ending.OK:
-        return SettledTurn(results, regime, 0, nothing(ending), None, ending)
+        return SettledTurn(results, regime, 0, nothing(ending), None, ending, found.sensitive)
     order = int(found.orders[0]) if regime.repeats else 0
     periods = order or _PERIODS
     motion = turn(values, settings.run, found.points, periods, max(16, points // periods))
     rows, arrived = whole_periods(values, settings, found.points)
-    return SettledTurn(results, regime, order, motion, as_parameters(rows[0]) if arrived[0] else None, ending)
+    state = as_parameters(rows[0]) if arrived[0] else None
+    return SettledTurn(results, regime, order, motion, state, ending, found.sensitive)
 
 
 def nothing(ending: Ending = Ending.OK) -> Trajectory:

@@ -55,6 +55,8 @@ from sprag_study.worker.models.vibration_drive.settled import (
     HISTORY_DEPENDENT,
     HISTORY_FLAGS,
     REGIME_FLAGS,
+    SENSITIVE_START,
+    START_FLAGS,
     SWEEP_FLAGS,
     followed_periods,
     is_settled,
@@ -95,6 +97,7 @@ FLAG_SENTENCES: dict[str, str] = {
     WINDUP_OUT_OF_DATA: "A clutch was wound up beyond the measured data, where its law was extrapolated linearly.",
     **REGIME_FLAGS,
     **HISTORY_FLAGS,
+    **START_FLAGS,
     **SWEEP_FLAGS,
 }
 #: Most cases whose frequency is evaluated for an estimate.
@@ -206,15 +209,23 @@ def run_of(run: Mapping[str, Any]) -> Run:
 
 
 def _flags(
-    infos: Iterable[ResultInfo], values: NDArray[np.float64], not_settled: NDArray[np.bool_] | None = None
+    infos: Iterable[ResultInfo],
+    values: NDArray[np.float64],
+    *,
+    not_settled: NDArray[np.bool_] | None = None,
+    sensitive: NDArray[np.bool_] | None = None,
 ) -> list[str]:
-    """Flags of every case, joined by commas; ``not_settled`` of runs of a given time."""
+    """Flags of every case, joined by commas; ``not_settled`` of runs of a given time, ``sensitive`` of settled motions
+    whose starts were examined.
+    """
     column = {info.name: values[:, index] for index, info in enumerate(infos)}
     beyond = np.column_stack([values for name, values in column.items() if name.endswith(".fraction.beyond_data")])
     raised = {WINDUP_OUT_OF_DATA: np.any(beyond > 0.0, axis=1)}
     if "regime" in column:
         raised |= {flag: column["regime"] == Regime[flag.upper()] for flag in REGIME_FLAGS}
         raised[HISTORY_DEPENDENT] = depends_on_history(column)
+    if sensitive is not None:
+        raised[SENSITIVE_START] = sensitive
     if not_settled is not None:
         raised = {NOT_SETTLED: not_settled, **raised}
     return [",".join(name for name, cases in raised.items() if cases[case]) for case in range(len(values))]
@@ -353,11 +364,11 @@ class VibrationDrive(Model):
         if task.lines is not None:
             return swept(task, lambda values: _flags(settled_infos(number), values))
         if is_settled(task.run):
-            settled = settle(task.columns, settings_of(task.run), cases=task.count)
-            flags = _flags(settled_infos(number), settled.values)
+            settled = settle(task.columns, settings_of(task.run), cases=task.count, examine_starts=True)
+            flags = _flags(settled_infos(number), settled.values, sensitive=settled.sensitive)
             return chunk_result(task.first, settled.endings, flags, with_settled_loads(task, settled))
         judged = simulate_judged(task.columns, run_of(task.run), cases=task.count)
-        batch, flags = judged.batch, _flags(result_infos(number), judged.batch.values, judged.off)
+        batch, flags = judged.batch, _flags(result_infos(number), judged.batch.values, not_settled=judged.off)
         return chunk_result(task.first, batch.endings, flags, with_loads(task, batch, run_of(task.run)))
 
     def extent(self, study: Study, case: int) -> Extent:
@@ -477,7 +488,7 @@ class _Strobes:
         return portrait(columns, run_of(study.run))
 
     def turn(self, study: Study, case: int, points: int) -> CaseTurn:
-        return turn_of(study, case, points, _flags)
+        return turn_of(study, case, points, lambda infos, values, own: _flags(infos, values, sensitive=own))
 
     def branch(self, study: Study, case: int, along: Along) -> CaseBranch:
         return branch_of(study, case, along)

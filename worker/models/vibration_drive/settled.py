@@ -41,6 +41,15 @@ HISTORY_FLAGS: Final[dict[str, str]] = {
         "others."
     ),
 }
+#: Flag of a case that came to its motion by a transient in which its start is lost.
+SENSITIVE_START: Final = "sensitive_start"
+START_FLAGS: Final[dict[str, str]] = {
+    SENSITIVE_START: (
+        "The transient before this motion makes a disturbance of the start of 1e-9 more than 1e-4 large, so that "
+        "rounding may decide to which motion the case comes. The results are those of the motion that was reached; "
+        "try 32 starts, which show whether there are others."
+    ),
+}
 #: Flag of a case of a sweep whose motion does not continue that of the case before it.
 JUMPED: Final = "jumped"
 #: Flags of a case of a sweep that did not start from an orbit of the case before it.

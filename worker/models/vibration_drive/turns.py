@@ -26,9 +26,11 @@ def turn_of(
     study: Study,
     case: int,
     points: int,
-    flags_of: Callable[[Iterable[ResultInfo], NDArray[np.float64]], list[str]],
+    flags_of: Callable[[Iterable[ResultInfo], NDArray[np.float64], NDArray[np.bool_] | None], list[str]],
 ) -> CaseTurn:
-    """The settled motion of a case of a settled study; ``flags_of`` gives the flags of rows of results."""
+    """The settled motion of a case of a settled study; ``flags_of`` gives the flags of rows of results, and of what is
+    known of their starts.
+    """
     from sprag_study.engine.vibration_drive.turn import settled_turn
 
     machine = case_machine(study, case)
@@ -39,6 +41,6 @@ def turn_of(
     results = {
         info.name: None if np.isnan(value) else value for info, value in zip(infos, values.tolist(), strict=True)
     }
-    flags = tuple(filter(None, flags_of(infos, values[None, :])[0].split(",")))
+    flags = tuple(filter(None, flags_of(infos, values[None, :], found.sensitive)[0].split(",")))
     regime = found.regime.name.lower() if found.regime else ""
     return CaseTurn(found.ending.value, flags, results, regime, found.order, found.motion, found.state)
