@@ -32,7 +32,8 @@ _LOADS: Final = Range("1", 0.0, 1e6)
 _COLUMNS: Final = (
     Column(Phrase("Mean speed"), "rad/s"), Column(Phrase("Smallest speed"), "rad/s"),
     Column(Phrase("Largest speed"), "rad/s"), Column(Phrase("Irregularity")), Column(Phrase("Multiplier")),
-    Column(Phrase("Cycle")), Column(Phrase("Comes from above"), "rad/s"), Column(Phrase("and below"), "rad/s"),
+    Column(Phrase("Cycle")), Column(Phrase("Reached from speeds above"), "rad/s"),
+    Column(Phrase("Reached from speeds below"), "rad/s"),
 )  # fmt: skip
 
 SpeedsAnswer = CaseAnswer[float, "SteadyCycles"]
@@ -141,7 +142,7 @@ def sentences_of(made: SteadyCycles) -> Sequence[str]:
         )
     if math.isfinite(made.runs_away_above):
         said.append(Phrase("From speeds above {speed} the shaft runs away.", speed=_speed(made.runs_away_above)))
-    if made.stable:
+    if any(cycle.low > 0.0 or math.isfinite(cycle.high) for cycle in made.stable):
         said.append(Phrase("Speeds from which the shaft comes to a cycle are those at the angle 0."))
     if not made.whole:
         said.append(Phrase("From some speeds the motion could not be followed: there may be more cycles."))

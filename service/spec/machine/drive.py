@@ -109,15 +109,13 @@ def drive_record() -> Record:
     fields: dict[str, Field] = {}
     required: list[str] = []
     catalogue = _catalogue()
+    tables: dict[str, dict[str, Field]] = {_SHAFT: {_LOAD_FIELD: LOAD}, _EXCITATION: {_HARMONICS_FIELD: OVERTONES}}
     for name in dict.fromkeys(entry.path.split(".")[0] for entry in catalogue):
         entries = {entry.path.split(".")[-1]: entry for entry in catalogue if entry.path.split(".")[0] == name}
         needed = required_of(entries)
         required += [name] if needed else []
         clutch: dict[str, Field] = {"clutch": CLUTCH} if name == _PENDULUMS else {}
-        table: dict[str, Field] = {_LOAD_FIELD: LOAD} if name == _SHAFT else {}
-        if name == _EXCITATION:
-            table = {_HARMONICS_FIELD: OVERTONES}
-        record = Record({**entries, **clutch, **table}, required=needed)
+        record = Record({**entries, **clutch, **tables.get(name, {})}, required=needed)
         fields[name] = Listed("pendulums", 1, MAX_PENDULUMS, item=record) if clutch else entries.get(name, record)
     whole = {**fields, "clutch": CLUTCH, START: START_AT}
     return Record(whole, "the machine that every case begins from", required)
