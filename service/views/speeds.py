@@ -61,18 +61,18 @@ class SpeedsView(CaseView[SpeedsQuestion, float, "SteadyCycles"]):
 
     def json(self, answer: SpeedsAnswer) -> SteadySpeeds:
         """The cycles as JSON data."""
-        made = answer.result
+        steady = answer.result
         return filled(
             SteadySpeeds,
-            made,
+            steady,
             case=answer.case,
             parameters=answer.parameters,
             load=answer.chosen,
-            cycles=[_row(cycle) for cycle in made.cycles],
-            of_case=made.case,
-            stops_below=made.stops_below or None,
-            speeds=made.speeds.tolist(),
-            changes=made.changes.tolist(),
+            cycles=[_row(cycle) for cycle in steady.cycles],
+            of_case=steady.case,
+            stops_below=steady.stops_below or None,
+            speeds=steady.speeds.tolist(),
+            changes=steady.changes.tolist(),
         )
 
     def csv(self, answer: SpeedsAnswer) -> bytes:
@@ -95,9 +95,9 @@ class SpeedsView(CaseView[SpeedsQuestion, float, "SteadyCycles"]):
 
     def shown(self, answer: SpeedsAnswer) -> Shown:
         """To which cycles the shaft comes from where, and the table of all of them."""
-        made = answer.result
-        table = ShownTable(_("Steady cycles"), _COLUMNS, [_cells(cycle) for cycle in made.cycles])
-        return Shown(tuple(sentences_of(made)), (table,) if made.cycles else ())
+        steady = answer.result
+        table = ShownTable(_("Steady cycles"), _COLUMNS, [_cells(cycle) for cycle in steady.cycles])
+        return Shown(tuple(sentences_of(steady)), (table,) if steady.cycles else ())
 
     def said(self, answer: SpeedsAnswer) -> Said:
         """The stable cycles."""
@@ -122,29 +122,29 @@ def _cells(cycle: SteadyCycle) -> list[Cell]:
     ]  # fmt: skip
 
 
-def sentences_of(made: SteadyCycles) -> Sequence[str]:
+def sentences_of(steady: SteadyCycles) -> Sequence[str]:
     """At which speeds the shaft turns steadily, to which it comes from where, and where it stops or runs away."""
     said: list[str] = []
-    if not made.stable:
+    if not steady.stable:
         said.append(Phrase("There is no stable steady cycle."))
-        if made.ending != models.OK:
-            said.append(Phrase(models.ENDING_SENTENCES[made.ending]))
-    said += [_comes(cycle) for cycle in made.stable]
-    if made.case is not None and len(made.cycles) > 1:
-        cycle = made.cycles[made.case]
+        if steady.ending != models.OK:
+            said.append(Phrase(models.ENDING_SENTENCES[steady.ending]))
+    said += [_comes(cycle) for cycle in steady.stable]
+    if steady.case is not None and len(steady.cycles) > 1:
+        cycle = steady.cycles[steady.case]
         which = N_("The results of the case are about the one at {mean}.")
         if not cycle.stable:
             which = N_("The cycle of the case, at {mean}, is unstable.")
         said.append(Phrase(which, mean=_speed(cycle.course.mean)))
-    if made.stops_below > 0.0:
+    if steady.stops_below > 0.0:
         said.append(
-            Phrase("From speeds below {speed} the shaft comes to a standstill.", speed=_speed(made.stops_below))
+            Phrase("From speeds below {speed} the shaft comes to a standstill.", speed=_speed(steady.stops_below))
         )
-    if math.isfinite(made.runs_away_above):
-        said.append(Phrase("From speeds above {speed} the shaft runs away.", speed=_speed(made.runs_away_above)))
-    if any(cycle.low > 0.0 or math.isfinite(cycle.high) for cycle in made.stable):
+    if math.isfinite(steady.runs_away_above):
+        said.append(Phrase("From speeds above {speed} the shaft runs away.", speed=_speed(steady.runs_away_above)))
+    if any(cycle.low > 0.0 or math.isfinite(cycle.high) for cycle in steady.stable):
         said.append(Phrase("Speeds from which the shaft comes to a cycle are those at the angle 0."))
-    if not made.whole:
+    if not steady.whole:
         said.append(Phrase("From some speeds the motion could not be followed: there may be more cycles."))
     return said
 
