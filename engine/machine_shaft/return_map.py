@@ -120,19 +120,19 @@ class ReturnMap:
         energy = np.repeat(begin[:, None], len(WEIGHTS), axis=1)
         done, active = np.zeros(count, dtype=np.bool_), np.arange(count)
         for _ in range(_ITERATIONS):
-            own = energy[active]
-            torque, slope = self.torque(piece, own)
-            left = begin[active, None] + apply(matrix, torque) - own
+            tried = energy[active]
+            torque, slope = self.torque(piece, tried)
+            left = begin[active, None] + apply(matrix, torque) - tried
             known = np.isfinite(left).all(axis=1) & np.isfinite(slope).all(axis=1)
-            active, own, left, slope = active[known], own[known], left[known], slope[known]
+            active, tried, left, slope = active[known], tried[known], left[known], slope[known]
             if not active.size:
                 break
-            step = np.empty(own.shape)
+            step = np.empty(tried.shape)
             kernels.newton_steps(matrix, np.ascontiguousarray(slope), np.ascontiguousarray(left), step)
-            following = own + step
+            following = tried + step
             # The torques of energies below 0 are not known.
-            following = np.maximum(following, 1e-3 * own)
-            moved = np.abs(following - own).max(axis=1) / np.abs(following).max(axis=1)
+            following = np.maximum(following, 1e-3 * tried)
+            moved = np.abs(following - tried).max(axis=1) / np.abs(following).max(axis=1)
             energy[active] = following
             done[active[moved < 1e-13]] = True
             active = active[moved >= 1e-13]
@@ -191,10 +191,10 @@ class ReturnMap:
         energy, growth = begin.copy(), np.ones(len(begin))
         turning = np.arange(len(begin))
         for low, high in parts:
-            own = self._over(low, high, energy[turning], backward, depth, trace)
-            energy[turning], growth[turning] = own.energy, growth[turning] * own.growth
-            out.stopped[rows[turning]], out.lost[rows[turning]] = own.stopped, own.lost
-            turning = turning[~(own.stopped | own.lost)]
+            after = self._over(low, high, energy[turning], backward, depth, trace)
+            energy[turning], growth[turning] = after.energy, growth[turning] * after.growth
+            out.stopped[rows[turning]], out.lost[rows[turning]] = after.stopped, after.lost
+            turning = turning[~(after.stopped | after.lost)]
             if not turning.size:
                 break
         out.energy[rows], out.growth[rows] = energy, growth

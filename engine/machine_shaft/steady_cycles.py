@@ -9,10 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from sprag_study.engine.endings import Ending
 from sprag_study.engine.machine_shaft.columns import Columns
-from sprag_study.engine.machine_shaft.machine import check_structure
+from sprag_study.engine.machine_shaft.machine import Machine, check_structure
 from sprag_study.engine.machine_shaft.panels import NODES, Panels
 from sprag_study.engine.machine_shaft.return_map import ReturnMap
 from sprag_study.engine.machine_shaft.spec import MachineSpec
+from sprag_study.engine.machine_shaft.speed_course import follows_speed
 from sprag_study.engine.machine_shaft.transient_bench import Bench, Cycle, bench_of, cycle_of
 
 Floats = NDArray[np.float64]
@@ -126,8 +127,8 @@ class _Scan(NamedTuple):
 
     @classmethod
     def of(cls, returns: ReturnMap, energy: Floats) -> "_Scan":
-        own = returns.follow(energy)
-        return cls(energy, own.energy - energy, own.growth, own.stopped, own.lost)
+        after = returns.follow(energy)
+        return cls(energy, after.energy - energy, after.growth, after.stopped, after.lost)
 
     def with_starts(self, returns: ReturnMap, energy: Floats) -> "_Scan":
         """This scan with further starts, in their order."""
@@ -198,16 +199,16 @@ def _roots(returns: ReturnMap, low: Floats, high: Floats, *, backward: bool) -> 
     for _ in range(_ITERATIONS):
         if not active.size:
             break
-        own = returns.follow(x[active], backward=backward)
-        change = own.energy - x[active]
+        after = returns.follow(x[active], backward=backward)
+        change = after.energy - x[active]
         low[active] = np.where(change >= 0.0, x[active], low[active])
         high[active] = np.where(change <= 0.0, x[active], high[active])
         with np.errstate(all="ignore"):
-            step = x[active] + change / (1.0 - own.growth)
+            step = x[active] + change / (1.0 - after.growth)
         inside = (step > low[active]) & (step < high[active])
         following = np.where(inside, step, 0.5 * (low[active] + high[active]))
         moved = np.abs(following - x[active])
-        x[active] = np.where(own.lost | (own.stopped & backward), np.nan, following)
+        x[active] = np.where(after.lost | (after.stopped & backward), np.nan, following)
         active = active[(moved > 1e-14 * following) & (change != 0.0) & np.isfinite(x[active])]
     return x
 
@@ -223,7 +224,7 @@ def _edge(returns: ReturnMap, low: float, high: float) -> float:
 def _cycle(bench: Bench, returns: ReturnMap, energy: float, *, stable: bool, low: float, high: float) -> SteadyCycle:
     """The cycle with an ``energy`` at the angle 0."""
     trace: list[tuple[float, Floats]] = []
-    own = returns.follow(np.array([energy]), backward=not stable, trace=trace)
+    after = returns.follow(np.array([energy]), backward=not stable, trace=trace)
     trace.sort(key=lambda part: part[0])
     ends = [end for end, _ in trace]
     cuts = np.array([[*([0.0, *ends] if stable else [*ends, bench.cycle])]])
@@ -232,7 +233,7 @@ def _cycle(bench: Bench, returns: ReturnMap, energy: float, *, stable: bool, low
     inertia = bench.at(bench.fields.inertia, panels.angles.ravel()).reshape(nodes.shape)
     course = cycle_of(panels, inertia, np.array([energy]), nodes - energy, bench.model.mean_speed_is)
     square = panels.extremes(2.0 * nodes / inertia)
-    growth = float(own.growth[0])
+    growth = float(after.growth[0])
     return SteadyCycle(
         panels, course, _speed(bench, energy), float(np.sqrt(square.highest[0])), float(np.sqrt(square.lowest[0])),
         growth if stable else 1.0 / growth, low if stable else np.nan, high if stable else np.nan,
@@ -258,9 +259,9 @@ def cycles_on(bench: Bench, ending: Ending, load: float = 1.0) -> SteadyCycles:
     at = np.nonzero(rises[:-1] != rises[1:])[0]
     stable, edge = rises[at], scan.edges()[at]
     energies = np.empty(len(at))
-    for own, backward in ((stable, False), (~stable, True)):
-        if own.any():
-            energies[own] = _roots(returns, scan.energy[at[own]], scan.energy[at[own] + 1], backward=backward)
+    for chosen, backward in ((stable, False), (~stable, True)):
+        if chosen.any():
+            energies[chosen] = _roots(returns, scan.energy[at[chosen]], scan.energy[at[chosen] + 1], backward=backward)
     # Above a speed at which the shaft just does not stop it may become faster, without a cycle between.
     edge &= np.isnan(energies)
     whole = whole and not np.isnan(energies[~edge]).any()
@@ -306,11 +307,19 @@ def steady_cycles(model: MachineSpec, columns: Mapping[str, ArrayLike], load: fl
         If a parameter is missing or unknown.
     """
     check_structure(model)
-    bench, ending = bench_of(model, Columns.of(model, columns, 1))
+    row = Columns.of(model, columns, 1)
+    if not _follows_speed(model, row):
+        return None
+    bench, ending = bench_of(model, row)
     none = np.empty(0)
     if bench is None:
         return SteadyCycles((), None, 0.0, np.inf, none, none, True, ending)
-    return cycles_on(bench, ending, load) if bench.follows_speed else None
+    return cycles_on(bench, ending, load)
+
+
+def _follows_speed(model: MachineSpec, row: Columns) -> bool:
+    """Whether a torque follows the speed, which is known before the case is solved."""
+    return model.balance == "motor" or follows_speed(Machine(model, row))
 
 
 def other_speed(model: MachineSpec, columns: Mapping[str, ArrayLike]) -> float:
@@ -320,8 +329,11 @@ def other_speed(model: MachineSpec, columns: Mapping[str, ArrayLike]) -> float:
     of a few cases. Parameters and errors are those of ``steady_cycles``.
     """
     check_structure(model)
-    bench, ending = bench_of(model, Columns.of(model, columns, 1))
-    if bench is None or not bench.follows_speed or ending not in {Ending.OK, Ending.UNSTABLE}:
+    row = Columns.of(model, columns, 1)
+    if not _follows_speed(model, row):
+        return np.nan
+    bench, ending = bench_of(model, row)
+    if bench is None or ending not in {Ending.OK, Ending.UNSTABLE}:
         return np.nan
     speeds = float(bench.machine.pace[0, 0, 0]) * _SCAN
     with np.errstate(all="ignore"):

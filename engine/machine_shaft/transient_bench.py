@@ -105,11 +105,6 @@ class Bench:
             self._law = scaled(law, self._factor)
         self.motor = self.machine.train.motor(row.under("drive.motor.")) if model.balance == "motor" else {}
 
-    @property
-    def follows_speed(self) -> bool:
-        """Whether a torque follows the speed."""
-        return bool(self.motor) or self._law is not None
-
     def fixed(self, load: float) -> Floats:
         """Torque at the nodes that does not follow the speed, with a factor on the operations."""
         return self.drive + self.passive + load * self._operation

@@ -217,8 +217,8 @@ def harmonics(columns: Mapping[str, ArrayLike], cases: int) -> list[Harmonic]:
     return listed
 
 
-def _harmonic_columns(harmonic: Harmonic, nu: Floats) -> list[Floats]:
-    """Columns of a harmonic in the order of `HarmonicColumn`."""
+def harmonic_columns(harmonic: Harmonic, nu: Floats) -> list[Floats]:
+    """Columns of a harmonic of bases that vibrate at ``nu`` in rad/s, in the order of `HarmonicColumn`."""
     square = np.square(harmonic.order * nu)
     x, y = harmonic.amplitude_x * square, harmonic.amplitude_y * square
     return [
@@ -400,7 +400,7 @@ def _overtones(
         moves = (harmonic.amplitude_x > 0.0) | (harmonic.amplitude_y > 0.0)
         highest = np.maximum(highest, np.where(moves, harmonic.order, 1.0))
     still = [np.zeros(cases)] * (HARMONIC_COLUMNS * (room - len(listed)))
-    return (x, y), highest, [*(column for harmonic in listed for column in _harmonic_columns(harmonic, nu)), *still]
+    return (x, y), highest, [*(column for harmonic in listed for column in harmonic_columns(harmonic, nu)), *still]
 
 
 def stop_column(stop: int) -> int:

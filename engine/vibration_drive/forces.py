@@ -20,13 +20,14 @@ from sprag_study.engine.vibration_drive.cases import (
     Harmonic,
     case_matrix,
     default_of,
+    harmonic_columns,
     harmonics,
     scalars,
     with_lengths,
 )
 from sprag_study.engine.vibration_drive.examined import examined_window, read_steps
 from sprag_study.engine.vibration_drive.force_results import Bearing, force_infos
-from sprag_study.engine.vibration_drive.formulas import base_series, drive, free_acceleration
+from sprag_study.engine.vibration_drive.formulas import base_series, drive, free_acceleration, harmonic_series
 from sprag_study.engine.vibration_drive.kernel import kernel_of
 from sprag_study.engine.vibration_drive.layout import PendulumSample
 from sprag_study.engine.vibration_drive.pieces import CLOSER, PLACES, Pieces, polynomials
@@ -266,13 +267,13 @@ class _Motion:
             *amplitudes, nu, elementary.sin(turned), elementary.cos(turned), sin_chi, cos_chi
         )
         vx, vy = -jerk_x / square, -jerk_y / square
-        for order, x, phase_x, y, phase_y in self.harmonics:
-            rate = order * self.nu
-            along_x, along_y = order * turned + phase_x, order * turned + phase_y
-            vx = vx - rate * x * elementary.sin(along_x)
-            vy = vy + rate * y * elementary.cos(along_y)
-            ax = ax - rate * rate * x * elementary.cos(along_x)
-            ay = ay - rate * rate * y * elementary.sin(along_y)
+        for harmonic in self.harmonics:
+            order, x_cos, x_sin, y_cos, y_sin = harmonic_columns(harmonic, np.array([self.nu]))
+            rate, angle = order * self.nu, order * turned
+            sin, cos = elementary.sin(angle), elementary.cos(angle)
+            (x, by_x), (y, by_y) = harmonic_series(x_cos, x_sin, y_cos, y_sin, rate, sin, cos)
+            vx, vy = vx - by_x / (rate * rate), vy - by_y / (rate * rate)
+            ax, ay = ax + x, ay + y
         return (vx, vy), (ax, ay)
 
     def on_table(self, now: _Instant) -> tuple[Floats, Floats]:
