@@ -155,6 +155,9 @@ class Curve(TypedDict):
             ),
         ]
     ]
+    error_absolute: NotRequired[
+        Annotated[dict[str, float | None], Doc("of a refined curve: `error` in the units of the results")]
+    ]
     jumps: NotRequired[
         Annotated[list[Jump], Doc("of a refined curve: where it is not interpolated; of a sweep: jumps")]
     ]
@@ -169,6 +172,13 @@ class Curve(TypedDict):
     ]
 
 
+class AskedError(TypedDict):
+    """The requested error of one result."""
+
+    value: float
+    absolute: Annotated[bool, Doc("whether it is in the unit of the result (SI); otherwise relative to its range")]
+
+
 class CurvesData(TypedDict):
     """Curves of results over one axis, without the study."""
 
@@ -176,7 +186,16 @@ class CurvesData(TypedDict):
     units: Annotated[dict[str, str], Doc("SI unit of every parameter in x, by and at")]
     results: dict[str, ResultMeaning]
     curves: list[Curve]
-    error_asked: NotRequired[Annotated[float, Doc("of refined curves: the requested error")]]
+    error_asked: NotRequired[
+        Annotated[
+            float, Doc("of refined curves: the requested error, relative to the range, of results without their own")
+        ]
+    ]
+    errors_asked: NotRequired[
+        Annotated[
+            dict[str, AskedError], Doc("of refined curves: requested errors of results with an error of their own")
+        ]
+    ]
 
 
 class Curves(CurvesData):
@@ -224,7 +243,15 @@ class MapData(TypedDict):
         ]
     ]
     points: NotRequired[Annotated[MapPoints, Doc("of a refined map: its cases")]]
-    error_asked: NotRequired[Annotated[float, Doc("of a refined map: the requested error")]]
+    error_asked: NotRequired[
+        Annotated[
+            float, Doc("of a refined map: the requested error, relative to the range unless `error_asked_absolute`")
+        ]
+    ]
+    error_asked_absolute: NotRequired[
+        Annotated[bool, Doc("of a refined map: whether the requested error is in the unit of the result")]
+    ]
+    error_absolute: NotRequired[Annotated[float | None, Doc("of a refined map: `error` in the unit of the result")]]
     error: NotRequired[
         Annotated[
             float | None,

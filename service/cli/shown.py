@@ -68,11 +68,15 @@ def _show_points(found: dict[str, Any], title: str) -> None:
     columns: list[Column] = [*((heading(axis["path"], axis["unit"]), True) for axis in axes)]
     columns += [(heading(found["z"]["name"], found["z"]["unit"]), True), (_("case"), True)]
     show_table(title, columns, list(zip(points["x"], points["y"], points["z"], points["cases"], strict=True)))
-    asked, jumps = _percent(found["error_asked"]), _percent(found["jumps_share"])
+    asked, jumps, error = _percent(found["error_asked"]), _percent(found["jumps_share"]), _error(found["error"])
+    if found.get("error_asked_absolute"):
+        unit = found["z"]["unit"]
+        asked = _absolute(found["error_asked"], unit, 5)
+        error = error if found["error"] is None else _absolute(found["error_absolute"], unit)
     say(
         _(
             "error: {error}, {asked} asked; {jumps} of the map is not interpolated",
-            error=_error(found["error"]),
+            error=error,
             asked=asked,
             jumps=jumps,
         )
@@ -81,6 +85,10 @@ def _show_points(found: dict[str, Any], title: str) -> None:
 
 def _error(error: float | None) -> str:
     return _("not known") if error is None else _("{share} of the range", share=_percent(error))
+
+
+def _absolute(error: float, unit: str, digits: int = 2) -> str:
+    return f"{decimal(f'{in_unit(error, unit):.{digits}g}')} {unit_of(unit)}".rstrip()
 
 
 def _percent(share: float) -> str:
@@ -136,7 +144,7 @@ def show_curves(found: Mapping[str, Any], of: str = "") -> None:
         rows = zip(drawn["x"], *drawn["y"].values(), *regimes, *[flags] * flagged, drawn["endings"], strict=True)
         show_table(title, columns, [(*row[:-1], "" if row[-1] == OK else row[-1]) for row in rows])
         if "error" in drawn:
-            say(*_refined(drawn, found["error_asked"], x["unit"]))
+            say(*_refined(drawn, found, x["unit"]))
         elif "jumps" in drawn:
             places = ((_ends(jump, x["unit"]), _(jump["why"])) for jump in drawn["jumps"])
             say(*(_("jump at {place} ({why})", place=place, why=why) for place, why in places))
@@ -165,10 +173,16 @@ def _doubts(drawn: Mapping[str, Any]) -> list[str]:
     return [", ".join(name for name in flags if name != regime) for flags, regime in points]
 
 
-def _refined(drawn: dict[str, Any], asked: float, unit: str) -> Iterator[str]:
+def _refined(drawn: dict[str, Any], found: Mapping[str, Any], unit: str) -> Iterator[str]:
     """What is known of a refined curve, in sentences."""
     for name, error in drawn["error"].items():
-        yield _("error of {name}: {error}, {asked} asked", name=name, error=_error(error), asked=_percent(asked))
+        bound = found.get("errors_asked", {}).get(name, {"value": found["error_asked"], "absolute": False})
+        wanted, of = _percent(bound["value"]), found["results"][name]["unit"]
+        text = _error(error)
+        if bound["absolute"]:
+            wanted = _absolute(bound["value"], of, 5)
+            text = text if error is None else _absolute(drawn["error_absolute"][name], of)
+        yield _("error of {name}: {error}, {asked} asked", name=name, error=text, asked=wanted)
     for jump in drawn["jumps"]:
         why, results = _(jump["why"].replace("_", " ")), ", ".join(jump["results"])
         place = _ends(jump, unit)

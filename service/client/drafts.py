@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Quantity: TypeAlias = SupportsFloat | str
 #: What belongs to paths: a mapping from each to it, or the objects of a spec.
 Entries: TypeAlias = Mapping[str, Any] | Sequence[Mapping[str, Any]]
-#: Results: one, several, conditions such as "torque.max <= 3 N*m", or a mapping of each to "min" or "max".
+#: Results: one, several, conditions such as "torque.max <= 3 N*m", or a mapping of each to "min", "max" or its error.
 Results: TypeAlias = str | Mapping[str, Any] | Sequence[str | Mapping[str, Any]]
 
 _CONDITION: Final = re.compile(r"([^\s<>=]+)\s*(<=|>=|=)\s*(.+)")
@@ -166,6 +166,16 @@ def results_of(results: Results | None) -> list[Any] | None:
         return [_result(name, value) for name, value in results.items()]
     listed = [results] if isinstance(results, str) else results
     return [_condition(item) if isinstance(item, str) else item for item in listed]
+
+
+def refined_results(results: Results) -> list[Any]:
+    """The items of a spec about results that are refined: names, and objects of those with an error of their own.
+
+    A mapping has the error of each result, None for the one of all.
+    """
+    if isinstance(results, Mapping):
+        return [name if error is None else {"result": name, "error": error} for name, error in results.items()]
+    return [results] if isinstance(results, str) else list(results)
 
 
 def _result(name: str, wanted: Any) -> dict[str, Any]:

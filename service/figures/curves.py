@@ -88,7 +88,7 @@ def _remark(curves: Curves) -> str:
     if curves.selection.swept:
         return hysteresis(curves)
     plan, refined = curves.selection.plan, [curve.refined for curve in curves.curves if curve.refined is not None]
-    return "" if plan is None else sentence(plan, refined, (info.name for info in curves.selection.results))
+    return "" if plan is None else sentence(plan, refined, curves.selection.results)
 
 
 def _bands(lines: Sequence[tuple[int, Curve]], info: ResultInfo) -> Iterator[Band]:

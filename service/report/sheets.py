@@ -101,7 +101,7 @@ def _between(report: Report) -> Iterator[str]:
     if plan is not None:
         curves = [curve.refined for curve in found.drawn.curves if curve.refined is not None]
         yield Phrase("the curves are straight lines between points that were chosen for their accuracy.")
-        said = refined.sentence(plan, curves, found.query.y[:1])
+        said = refined.sentence(plan, curves, found.drawn.selection.results[:1])
         if said:
             yield said
         return

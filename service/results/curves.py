@@ -14,7 +14,7 @@ from sprag_study.service.answers.results import Curve as CurveData
 from sprag_study.service.answers.results import CurvesData, Jump, MapData, MapPoints, MapResult, ResultMeaning
 from sprag_study.service.json_text import numbers
 from sprag_study.service.reading.directions import in_words
-from sprag_study.service.results.refined import Line, RefinedMap, jumps_of
+from sprag_study.service.results.refined import Line, RefinedMap, asked_errors, jumps_of
 from sprag_study.worker.arrays import Bools, Floats, Ints
 from sprag_study.worker.codes import PENDING
 from sprag_study.worker.models import OK, WorkerEnding
@@ -138,7 +138,10 @@ class Curve:
             return data
         errors = {info.name: self.refined.errors[info.name] for info in results if info.name in self.refined.errors}
         jumps = jumps_of(self.refined, self.refined.errors)
-        return {**data, "error": errors, "jumps": jumps, "passed": self.refined.passed}
+        absolute = {
+            name: None if error is None else error * self.refined.ranges[name] for name, error in errors.items()
+        }
+        return {**data, "error": errors, "error_absolute": absolute, "jumps": jumps, "passed": self.refined.passed}
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +161,11 @@ class Curves:
             "results": {info.name: filled(ResultMeaning, info) for info in chosen.results},
             "curves": [curve.to_json(chosen.results, chosen.units) for curve in self.curves],
         }
-        return data if chosen.plan is None else {**data, "error_asked": chosen.plan.error}
+        if chosen.plan is None:
+            return data
+        errors = asked_errors(chosen.plan, (info.name for info in chosen.results))
+        data = {**data, "error_asked": chosen.plan.error}
+        return {**data, "errors_asked": errors} if errors else data
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,15 +214,17 @@ class Map:
             "z": numbers(known.values),
             "cases": known.cases.tolist(),
         }
-        return {
+        data: MapData = {
             **self._grid(),
             "cases": [],
             "points": points,
-            "error_asked": known.asked,
+            "error_asked": known.asked.value,
             "error": known.error,
+            "error_absolute": known.absolute,
             "jumps_share": known.jumps_share,
             "passed": known.passed,
         }
+        return {**data, "error_asked_absolute": True} if known.asked.absolute else data
 
     def _grid(self) -> MapData:
         data: MapData = {

@@ -29,10 +29,11 @@ from sprag_study.service.spec.described import Described
 from sprag_study.service.spec.kinds.calibrate import CALIBRATE as CALIBRATION
 from sprag_study.service.spec.kinds.goal import GOAL as SEARCH
 from sprag_study.service.spec.kinds.refine import REFINE as REFINEMENT
+from sprag_study.worker import models
 from sprag_study.worker.directions import SWEEP, direction
 from sprag_study.worker.planning.calibrate.plan import CALIBRATE
 from sprag_study.worker.planning.goals.plan import GOAL
-from sprag_study.worker.planning.refine_plan import REFINE, RefinePlan
+from sprag_study.worker.planning.refine_plan import REFINE, ErrorBound, RefinePlan
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -197,6 +198,13 @@ def _text(item: Input, reading: Reading) -> str:
     return reading.quantity(item.value, item.unit, _DIGITS)
 
 
+def _error_of(study: Study, reading: Reading, name: str, bound: ErrorBound) -> str:
+    """The error of one result, for people."""
+    unit = next(info.unit for info in models.study_results(study) if info.name == name)
+    text = reading.quantity(bound.value, unit, _DIGITS) if bound.absolute else f"{number(100.0 * bound.value, 4)} %"
+    return f"{reading.caption(name)} {text}"
+
+
 def _asked(one: ReadStudy) -> _Cells:
     """What is searched, refined or calibrated."""
     study, reading = one.study, one.reading
@@ -213,7 +221,10 @@ def _asked(one: ReadStudy) -> _Cells:
         refined = RefinePlan.from_json(study.plan or {})
         text = ", ".join(map(reading.caption, refined.results))
         yield "refine.results", _Cell(_("Refined results"), text, text)
-        yield "refine.error", _Cell(_("Largest error"), refined.error, f"{number(100.0 * refined.error, 4)} %")
+        share = f"{number(100.0 * refined.error, 4)} %"
+        errors = [_error_of(study, reading, name, bound) for name, bound in refined.errors.items()]
+        text = "; ".join([share, *errors])
+        yield "refine.error", _Cell(_("Largest error"), text if errors else refined.error, text)
     elif study.kind == CALIBRATE:
         values = sum(len(own.values) for own in plan_of(study).measured)
         csv = one.spec["calibrate"]["measured"]["csv"]

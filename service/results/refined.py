@@ -8,20 +8,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag_study.sentences import Name
+from sprag_study.sentences import Amount, Name
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.reader import Phrase, joined, plural
 from sprag_study.service.reading.wording import percent
 from sprag_study.worker import models
 from sprag_study.worker.planning.refine import Curve as Refined
 from sprag_study.worker.planning.refine import describe
-from sprag_study.worker.planning.refine_plan import REFINE, RefinePlan
+from sprag_study.worker.planning.refine_plan import REFINE, ErrorBound, RefinePlan
 from sprag_study.worker.planning.rounds import Rows
 
 if TYPE_CHECKING:
-    from sprag_study.service.answers.results import Jump
+    from sprag_study.service.answers.results import AskedError, Jump
     from sprag_study.service.storage.studies.records import CaseColumns
     from sprag_study.worker.arrays import Bools, Floats, Ints
+    from sprag_study.worker.models import ResultInfo
     from sprag_study.worker.study import Study
 
 
@@ -41,8 +42,14 @@ class RefinedMap:
 
     Attributes
     ----------
-    asked, error : float
-        The requested error, and the estimated one outside jumps (None: not known yet), relative to the range.
+    asked : ErrorBound
+        The requested error.
+    error : float or None
+        The estimated one outside jumps, relative to the range; None: not known yet.
+    absolute : float or None
+        The estimated error in the unit of the result (SI).
+    unit : str
+        Unit of the result.
     jumps_share : float
         Share of the map that is not interpolated.
     passed : bool
@@ -52,8 +59,10 @@ class RefinedMap:
     cases : int64 array, shape (points,)
     """
 
-    asked: float
+    asked: ErrorBound
     error: float | None
+    absolute: float | None
+    unit: str
     jumps_share: float
     passed: bool
     x: Floats
@@ -71,7 +80,8 @@ class RefinedMap:
         """How right the map is, for people."""
         share = percent(self.jumps_share)
         outside = Phrase("outside jumps ({share} of the map)", share=share) if self.jumps_share else Phrase("")
-        return reached(self.asked, self.error, outside, passed=self.passed, failed=self.failed)
+        error = self.absolute if self.asked.absolute else self.error
+        return reached(self.asked, error, outside, self.unit, passed=self.passed, failed=self.failed)
 
 
 def curve_plan(study: Study) -> RefinePlan | None:
@@ -161,12 +171,28 @@ def not_joined(refined: Refined, names: Sequence[str]) -> list[str]:
     return [*(texts or [""] * (len(refined.x) - 1)), ""] if len(refined.x) else []
 
 
-def sentence(plan: RefinePlan, curves: Sequence[Refined], names: Iterable[str]) -> str:
+def sentence(plan: RefinePlan, curves: Sequence[Refined], results: Iterable[ResultInfo]) -> str:
     """How right the curves of these results are, for people; "" where none of them was asked for."""
-    drawn = list(dict.fromkeys(names))
+    drawn = {info.name: info for info in results}
     asked = [name for name in drawn if name in plan.results]
     if not asked:
         return ""
+    # Results without an error of their own share a sentence, the others have one each.
+    groups = [[name for name in asked if name not in plan.errors], *([name] for name in asked if name in plan.errors)]
+    groups = [group for group in groups if group]
+    texts = [_sentence(plan, curves, [drawn[name] for name in group]) for group in groups]
+    if len(groups) > 1:
+        named = (joined(", ", (Name(name, within=place > 0) for place, name in enumerate(group))) for group in groups)
+        texts = [Phrase("{names}: {text}", names=names, text=text) for names, text in zip(named, texts, strict=True)]
+    text = joined(" ", texts) if len(texts) > 1 else texts[0]
+    others = [name for name in drawn if name not in asked]
+    names = joined(", ", (Name(name, within=True) for name in others))
+    return Phrase("{text} No error was asked for {names}.", text=text, names=names) if others else text
+
+
+def _sentence(plan: RefinePlan, curves: Sequence[Refined], results: Sequence[ResultInfo]) -> Phrase:
+    """How right the curves of results of the same requested error are."""
+    asked = [info.name for info in results]
     broken = [jumps_of(curve, asked) for curve in curves]
     count = sum(map(_apart, broken))
     within = sum(jump["high"] - jump["low"] for jumps in broken for jump in jumps)
@@ -181,35 +207,45 @@ def sentence(plan: RefinePlan, curves: Sequence[Refined], names: Iterable[str]) 
         if count
         else Phrase("")
     )
-    every = [curve.errors[name] for curve in curves for name in asked if np.isfinite(curve.values[name]).any()]
+    bound = plan.asked(asked[0])
+    # An absolute error is compared in the unit of the result: curves have ranges of their own.
+    every = [
+        error if error is None or not bound.absolute else error * curve.ranges[name]
+        for curve in curves for name in asked if np.isfinite(curve.values[name]).any()
+        for error in [curve.errors[name]]
+    ]  # fmt: skip
     error = None if None in every or not every else max(error for error in every if error is not None)
     passed = all(curve.passed for curve in curves)
     without = sum(len(curve.x) > 0 and not _has_result(curve, asked) for curve in curves)
-    text = reached(plan.error, error, outside, passed=passed, failed=without == len(curves) > 0)
+    failed = without == len(curves) > 0
+    text = reached(bound, error, outside, results[0].unit, passed=passed, failed=failed)
     if 0 < without < len(curves):
         missing = plural("{count} curve has no result.", "{count} curves have no result.", without)
         text = Phrase("{text} {missing}", text=text, missing=missing)
-    others = [name for name in drawn if name not in asked]
-    names = joined(", ", (Name(name, within=True) for name in others))
-    return Phrase("{text} No error was asked for {names}.", text=text, names=names) if others else text
+    return text
 
 
 def _has_result(curve: Refined, names: Iterable[str]) -> bool:
     return any(bool(np.isfinite(curve.values[name]).any()) for name in names)
 
 
-def reached(asked: float, error: float | None, outside: Phrase, *, passed: bool, failed: bool) -> Phrase:
+def reached(
+    asked: ErrorBound, error: float | None, outside: Phrase, unit: str, *, passed: bool, failed: bool
+) -> Phrase:
     """Whether a requested error is reached, for people; ``outside`` is "outside 2 jumps", or "" without jumps.
 
+    ``error`` is relative to the range as the requested one is, or absolute in the ``unit`` of the result (SI).
     ``failed`` says that cases were run and none of them has a result.
     """
-    wanted = percent(asked)
+    if asked.absolute:
+        return _reached_absolute(asked.value, error, outside, unit, passed=passed, failed=failed)
+    wanted = percent(asked.value)
     if failed:
         return Phrase("No case has a result, so that there is no error; {asked} of the range is asked.", asked=wanted)
     if error is None:
         return Phrase("The error is not known yet; {asked} of the range is asked.", asked=wanted)
     now = percent(error)
-    if passed and error <= asked:
+    if passed and error <= asked.value:
         if outside:
             text = N_("Within {asked} of the range, as asked, {outside} (estimate: {error}).")
             return Phrase(text, asked=wanted, outside=outside, error=now)
@@ -218,6 +254,33 @@ def reached(asked: float, error: float | None, outside: Phrase, *, passed: bool,
         text = N_("Not reached: {error} of the range now {outside}, {asked} asked.")
         return Phrase(text, asked=wanted, outside=outside, error=now)
     return Phrase("Not reached: {error} of the range now, {asked} asked.", asked=wanted, error=now)
+
+
+def _reached_absolute(
+    asked: float, error: float | None, outside: Phrase, unit: str, *, passed: bool, failed: bool
+) -> Phrase:
+    wanted = Amount(asked, unit)
+    if failed:
+        return Phrase("No case has a result, so that there is no error; {asked} is asked.", asked=wanted)
+    if error is None:
+        return Phrase("The error is not known yet; {asked} is asked.", asked=wanted)
+    now = Amount(error, unit, digits=2)
+    if passed and error <= asked:
+        if outside:
+            text = N_("Within {asked}, as asked, {outside} (estimate: {error}).")
+            return Phrase(text, asked=wanted, outside=outside, error=now)
+        return Phrase("Within {asked}, as asked (estimate: {error}).", asked=wanted, error=now)
+    if outside:
+        text = N_("Not reached: {error} now {outside}, {asked} asked.")
+        return Phrase(text, asked=wanted, outside=outside, error=now)
+    return Phrase("Not reached: {error} now, {asked} asked.", asked=wanted, error=now)
+
+
+def asked_errors(plan: RefinePlan, names: Iterable[str]) -> dict[str, AskedError]:
+    """The errors that were asked for one result alone, as JSON data."""
+    return {
+        name: {"value": bound.value, "absolute": bound.absolute} for name in names if (bound := plan.errors.get(name))
+    }
 
 
 def _apart(jumps: Sequence[Jump]) -> int:

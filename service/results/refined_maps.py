@@ -76,9 +76,12 @@ def draw_refined_map(
     empty = PENDING if not len(own.cells) else JUMP
     endings = np.where(np.isnan(values), empty, INTERPOLATED).tolist()
     columns = [points[:, len(plan.fixed) + side] for side in sides]
+    error = own.errors[z]
     known = RefinedMap(
-        plan.error,
-        own.errors[z],
+        plan.asked(z),
+        error,
+        None if error is None else error * own.ranges[z],
+        result.unit,
         own.jumps_share[z],
         own.passed,
         columns[0],

@@ -8,7 +8,7 @@ from sprag_study.sentences import Amount
 from sprag_study.service.json_text import timestamp
 from sprag_study.service.languages import N_, decimal
 from sprag_study.service.reading.reader import Phrase, joined, plural
-from sprag_study.service.reading.wording import percent
+from sprag_study.service.reading.wording import number, percent
 from sprag_study.worker.planning.calibrate.plan import CALIBRATE
 from sprag_study.worker.planning.goals.fresh import FRESH
 from sprag_study.worker.planning.goals.plan import GOAL
@@ -89,6 +89,11 @@ def _state(summary: dict[str, Any], *, ended: bool) -> list[Phrase]:
         text = N_("error {error}") if ended else N_("error now {error}")
         now = Phrase(text, error=percent(error))
     missed = [Phrase("not reached with the cases allowed")] if ended and not summary.get("passed", True) else []
+    if summary.get("each"):
+        # Errors of several kinds are compared by how many times the asked ones they are.
+        if error is not None:
+            now = Phrase("largest error {times} times the one asked", times=number(error / asked, 3))
+        return [now, *missed]
     return [now, Phrase("asked {error}", error=percent(asked)), *missed]
 
 

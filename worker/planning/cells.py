@@ -35,7 +35,7 @@ class Cells:
     ----------
     map, low_x, low_y, width, height : int64 arrays, shape (cells,)
     difference : float64 array, shape (cells, 2, results)
-        Along each axis, relative to the range; of the cell, or of the ancestor that was halved last along the axis
+        Along each axis, relative to the scale; of the cell, or of the ancestor that was halved last along the axis
         where the cell's own midpoints are not known; infinite where values are missing.
     worst : float64 array, shape (cells,)
         The largest difference of the parent that more points would make smaller; infinite in the first generation.
@@ -85,15 +85,15 @@ class Tree:
     resolved: Bools
 
 
-def tree(samples: Samples, ranges: Floats) -> Tree:
-    """The tree of cells of all maps; ``ranges`` has shape (maps, results)."""
+def tree(samples: Samples, scales: Floats) -> Tree:
+    """The tree of cells of all maps; ``scales`` has shape (maps, results)."""
     error = samples.plan.error
     cells = _first(samples)
     leaves: list[Cells] = []
     states: list[Bools] = []
     while len(cells) or not leaves:
         tested = _tested(samples, cells)
-        own, worst = _differences(samples, ranges, cells)
+        own, worst = _differences(samples, scales, cells)
         cells = replace(cells, difference=own)
         largest = worst.max(axis=1)
         wide = np.maximum(cells.width, cells.height) > samples.plan.finest // _DIVIDED
@@ -129,7 +129,7 @@ def _tested(samples: Samples, cells: Cells) -> Bools:
     return np.asarray(np.logical_and.reduce(known))
 
 
-def _differences(samples: Samples, ranges: Floats, cells: Cells) -> tuple[Floats, Floats]:
+def _differences(samples: Samples, scales: Floats, cells: Cells) -> tuple[Floats, Floats]:
     """Differences, shape (cells, 2, results), and the largest that points make smaller, shape (cells, 2).
 
     The second is 0 along an axis of the finest width.
@@ -140,7 +140,7 @@ def _differences(samples: Samples, ranges: Floats, cells: Cells) -> tuple[Floats
     for axis, size in enumerate((cells.width, cells.height)):
         here = size > 1
         places = cells.middles(axis)
-        both = [_difference(samples, ranges, *pair, middle) for pair, middle in zip(ends[axis], places, strict=True)]
+        both = [_difference(samples, scales, *pair, middle) for pair, middle in zip(ends[axis], places, strict=True)]
         found[here, axis] = np.maximum(both[0][0], both[1][0])[here]
         worst[here, axis] = np.maximum(both[0][1], both[1][1])[here]
     return found, worst
@@ -148,18 +148,18 @@ def _differences(samples: Samples, ranges: Floats, cells: Cells) -> tuple[Floats
 
 def _difference(
     samples: Samples,
-    ranges: Floats,
+    scales: Floats,
     start: tuple[Ints, Ints, Ints],
     end: tuple[Ints, Ints, Ints],
     middle: tuple[Ints, Ints, Ints],
 ) -> tuple[Floats, Floats]:
     """The difference of edges, shape (cells, results), and its largest that more points make smaller, (cells,)."""
     left, centre, right = samples.values[start], samples.values[middle], samples.values[end]
-    raw = np.abs(centre - 0.5 * (left + right)) / ranges[start[0]]
+    raw = np.abs(centre - 0.5 * (left + right)) / scales[start[0]]
     width = np.maximum.reduce([samples.widths[place] for place in (start, middle, end)])
     irregular = np.logical_and.reduce([samples.irregular[place] for place in (start, middle, end)])
     # As on curves: a mean stops within two half widths, an extreme of irregular motion at once.
-    scatter = np.where(samples.has_width, raw * ranges[start[0]] <= 2.0 * width, irregular[:, None])
+    scatter = np.where(samples.has_width, raw * scales[start[0]] <= 2.0 * width, irregular[:, None])
     less = np.where(scatter, np.minimum(raw, samples.plan.error), raw)
     nowhere = ~np.isfinite(left) & ~np.isfinite(centre) & ~np.isfinite(right)
     less = np.where(nowhere, 0.0, np.where(np.isfinite(less), less, np.inf))

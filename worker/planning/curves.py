@@ -71,7 +71,7 @@ class Intervals:
     resolved : bool array, shape (intervals,)
         Whether the interval needs no more points: it passed, or is of the finest width.
     errors : float64 array, shape (intervals, results)
-        Estimated error of the straight line, relative to the range; NaN where nothing is known of it.
+        Estimated error of the straight line, relative to the scale; NaN where nothing is known of it.
     jumps : bool array, shape (intervals, results)
         Where the result must not be interpolated.
     why : int64 array, shape (intervals,)
@@ -94,7 +94,7 @@ class Intervals:
 class _Triples:
     """Every dyadic interval with its midpoint, for one length.
 
-    ``raw`` (curves, intervals, results) are the differences, relative to the range; ``worst`` (curves, intervals)
+    ``raw`` (curves, intervals, results) are the differences, relative to the scale; ``worst`` (curves, intervals)
     is the largest difference that more points would make smaller, infinite where the motions are different.
     """
 
@@ -104,8 +104,8 @@ class _Triples:
 
 def intervals(samples: Samples) -> Intervals:
     """The intervals of all curves."""
-    plan, ranges = samples.plan, samples.ranges()
-    triples = _all_triples(samples, ranges)
+    plan, scales = samples.plan, samples.scales()
+    triples = _all_triples(samples, scales)
     curve, place = np.nonzero(samples.known)
     inner = np.flatnonzero(curve[1:] == curve[:-1])
     curve, low, width = curve[inner], place[inner], place[inner + 1] - place[inner]
@@ -122,7 +122,7 @@ def intervals(samples: Samples) -> Intervals:
     passed = (worst <= tolerance) & ((worst <= tolerance / _SHRINKS) | (before <= tolerance * _SHRINKS))
     passed &= width <= most
     resolved = passed | (width == 1)
-    jumps, bends = _jumps(samples, ranges, curve, low, width, passed)
+    jumps, bends = _jumps(samples, scales, curve, low, width, passed)
     errors = np.where(width[:, None] == 1, np.where(np.isnan(bends), raw, bends), raw)
     both = samples.irregular[curve, low] & samples.irregular[curve, low + width]
     # What passed only because it scatters.
@@ -136,17 +136,17 @@ def intervals(samples: Samples) -> Intervals:
     return Intervals(curve, low, width, resolved, errors, reported, why, worth)
 
 
-def _all_triples(samples: Samples, ranges: Floats) -> dict[int, _Triples]:
+def _all_triples(samples: Samples, scales: Floats) -> dict[int, _Triples]:
     """`_Triples` by the length of the interval."""
     found: dict[int, _Triples] = {}
     length = samples.plan.finest
     while length >= 2:
-        found[length] = _triples(samples, ranges, length)
+        found[length] = _triples(samples, scales, length)
         length //= 2
     return found
 
 
-def _triples(samples: Samples, ranges: Floats, length: int) -> _Triples:
+def _triples(samples: Samples, scales: Floats, length: int) -> _Triples:
     error, codes = samples.plan.error, samples.codes
     ends, middles = slice(0, None, length), slice(length // 2, None, length)
 
@@ -155,13 +155,13 @@ def _triples(samples: Samples, ranges: Floats, length: int) -> _Triples:
 
     left, middle, right = three(samples.values)
     with np.errstate(invalid="ignore"):
-        raw = np.abs(middle - 0.5 * (left + right)) / ranges[:, None, :]
+        raw = np.abs(middle - 0.5 * (left + right)) / scales[:, None, :]
     known = np.logical_and.reduce(three(samples.known))
     raw = np.where(known[:, :, None], raw, np.nan)
     width = np.maximum.reduce(three(samples.widths))
     irregular = np.logical_and.reduce(three(samples.irregular))
     # More points do not tell a scattering result better: a mean stops within two half widths, an extreme at once.
-    scatter = np.where(samples.has_width, raw * ranges[:, None, :] <= 2.0 * width, irregular[:, :, None])
+    scatter = np.where(samples.has_width, raw * scales[:, None, :] <= 2.0 * width, irregular[:, :, None])
     differences = np.where(scatter, np.minimum(raw, error), raw)
     nowhere = ~np.isfinite(left) & ~np.isfinite(middle) & ~np.isfinite(right)
     differences = np.where(nowhere, 0.0, np.where(np.isfinite(differences), differences, np.inf))
@@ -196,16 +196,16 @@ def _of_ancestor(triples: dict[int, _Triples], curve: Ints, low: Ints, length: I
 
 
 def _jumps(
-    samples: Samples, ranges: Floats, curve: Ints, low: Ints, width: Ints, passed: Bools
+    samples: Samples, scales: Floats, curve: Ints, low: Ints, width: Ints, passed: Bools
 ) -> tuple[Bools, Floats]:
     """Intervals that hold a jump of a result, and how far the curve bends at their straighter end.
 
-    Both of shape (intervals, results), the second relative to the range. A jump bends the curve at both ends, one way
+    Both of shape (intervals, results), the second relative to the scale. A jump bends the curve at both ends, one way
     and then the other; smooth parts beside it are straight at their other end.
     """
     error = samples.plan.error
     start, end = samples.values[curve, low], samples.values[curve, low + width]
-    rise = (end - start) / ranges[curve]
+    rise = (end - start) / scales[curve]
     slope = rise / width[:, None]
     neighbours = (curve[1:] == curve[:-1])[:, None]
     gap = np.full((1, rise.shape[1]), np.nan)
@@ -216,7 +216,7 @@ def _jumps(
     least = np.minimum(np.abs(before), np.abs(after))
     bends = 0.25 * least
     missing = ~np.isfinite(start) | ~np.isfinite(end)
-    wide = np.maximum(samples.widths[curve, low], samples.widths[curve, low + width]) > error * ranges[curve]
+    wide = np.maximum(samples.widths[curve, low], samples.widths[curve, low + width]) > error * scales[curve]
     jump = np.where(before * after < 0.0, least, bends) > error
     codes = samples.codes
     change = codes[curve, low] != codes[curve, low + width]

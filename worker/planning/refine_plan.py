@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
@@ -64,6 +64,21 @@ class FixedAxis:
 
 
 @dataclass(frozen=True)
+class ErrorBound:
+    """The largest error of one result, which differs from that of the others.
+
+    Attributes
+    ----------
+    value : float
+        Relative to the range of the result over its curve or map, or in its unit (SI) where it is ``absolute``.
+    absolute : bool
+    """
+
+    value: float
+    absolute: bool = False
+
+
+@dataclass(frozen=True)
 class RefinePlan:
     """What a refinement asks for. The columns of its points are the fixed axes in their order, then the adaptive ones.
 
@@ -72,7 +87,8 @@ class RefinePlan:
     results : tuple of str
         Results that must be accurate to within the error.
     error : float
-        Largest error, relative to the range of the result over its curve or map.
+        Largest error, relative to the range of the result over its curve or map, of results without an error of their
+        own.
     start : int
         Values of each adaptive axis in the first round: a power of two plus one.
     finest : int
@@ -86,6 +102,8 @@ class RefinePlan:
         Whether the motions are settled: changes of regime and order are jumps, irregular motion scatters.
     half_widths : tuple of str
         Those of the results that have a half width ("NAME.half_width") where the motion is irregular.
+    errors : dict of str to ErrorBound
+        Results with an error of their own.
 
     Raises
     ------
@@ -102,12 +120,17 @@ class RefinePlan:
     most: int | None = None
     regime: bool = False
     half_widths: tuple[str, ...] = ()
+    errors: Mapping[str, ErrorBound] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         _check(bool(self.results), "results", list(self.results), "at least one name")
         _check(len(set(self.results)) == len(self.results), "results", list(self.results), "different names")
         _check(set(self.half_widths) <= set(self.results), "half_widths", list(self.half_widths), "names of results")
         _check(0.0 < self.error < 1.0, "error", self.error, "between 0 and 1, exclusive")
+        _check(set(self.errors) <= set(self.results), "errors", list(self.errors), "errors of results")
+        for name, bound in self.errors.items():
+            valid = 0.0 < bound.value < (math.inf if bound.absolute else 1.0)
+            _check(valid, f"errors {name}", bound.value, "above 0" if bound.absolute else "between 0 and 1, exclusive")
         _check(_power(self.finest) and self.finest <= _MAX_FINEST, "finest", self.finest, "a power of two up to 65,536")
         allowed = f"a power of two plus one, from 3 to {self.finest + 1}"
         _check(3 <= self.start <= self.finest + 1 and _power(self.start - 1), "start", self.start, allowed)
@@ -147,6 +170,7 @@ class RefinePlan:
             most=None if most is None else int(most),
             regime=bool(data.get("regime", False)),
             half_widths=tuple(data.get("half_widths", ())),
+            errors={name: ErrorBound(**bound) for name, bound in data.get("errors", {}).items()},
         )
 
     def to_json(self) -> dict[str, Any]:
@@ -162,7 +186,12 @@ class RefinePlan:
             "fixed": [{"paths": list(a.paths), "values": list(a.values)} for a in self.fixed],
             "regime": self.regime,
             "half_widths": list(self.half_widths),
+            **({"errors": {name: asdict(bound) for name, bound in self.errors.items()}} if self.errors else {}),
         }
+
+    def asked(self, name: str) -> ErrorBound:
+        """The largest error of a result."""
+        return self.errors.get(name, ErrorBound(self.error))
 
     @property
     def paths(self) -> tuple[tuple[str, ...], ...]:

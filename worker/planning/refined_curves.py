@@ -64,7 +64,7 @@ class Curve(Described):
     x : float64 array, shape (points,)
         The adaptive parameter, SI, ascending.
     ok, values, errors, passed
-        As of `Described`; the interpolation is by straight lines.
+        As of `Described`, with ``ranges``, ``shares`` and ``asked``; the interpolation is by straight lines.
     joined : dict of str to bool array, each shape (points - 1,)
         Whether a straight line from each point to the next shows the result.
     jumps : tuple of Jump
@@ -76,6 +76,9 @@ class Curve(Described):
     values: dict[str, Floats]
     joined: dict[str, Bools]
     errors: dict[str, float | None]
+    ranges: dict[str, float]
+    shares: dict[str, float]
+    asked: float
     jumps: tuple[Jump, ...]
     passed: bool
 
@@ -139,13 +142,27 @@ def _curves(samples: Samples, own: Intervals) -> list[Curve]:
     jumps = own.jumps & (present | ~present.any(axis=1, keepdims=True))[own.curve]
     merged = _merged(samples.plan, own, jumps)
     parts = (slice(bounds[index], bounds[index + 1]) for index in range(len(known)))
-    return [_curve(samples, own, index, part, jumps[part], merged[index]) for index, part in enumerate(parts)]
+    measures = list(zip(*samples.measures(), strict=True))
+    return [
+        _curve(samples, own, index, part, jumps[part], merged[index], *measures[index])
+        for index, part in enumerate(parts)
+    ]
 
 
-def _curve(samples: Samples, own: Intervals, index: int, part: slice, jumps: Bools, merged: list[Jump]) -> Curve:
+def _curve(
+    samples: Samples,
+    own: Intervals,
+    index: int,
+    part: slice,
+    jumps: Bools,
+    merged: list[Jump],
+    ranges: Floats,
+    shares: Floats,
+) -> Curve:
     plan = samples.plan
     places = np.flatnonzero(samples.known[index])
-    values, errors = samples.values[index, places], own.errors[part]
+    # Relative to the ranges instead of the scales; exactly the same for a result without an error of its own.
+    values, errors = samples.values[index, places], own.errors[part] * (shares / plan.error)
     passed = len(places) > 1 and bool(own.resolved[part].all())
     return Curve(
         fixed=plan.fixed_values(index),
@@ -157,6 +174,9 @@ def _curve(samples: Samples, own: Intervals, index: int, part: slice, jumps: Boo
             name: _largest_of(errors[~jumps[:, k], k], passed) if np.isfinite(values[:, k]).any() else None
             for k, name in enumerate(plan.results)
         },
+        ranges=dict(zip(plan.results, ranges.tolist(), strict=True)),
+        shares=dict(zip(plan.results, shares.tolist(), strict=True)),
+        asked=plan.error,
         jumps=tuple(merged),
         passed=passed,
     )

@@ -41,7 +41,7 @@ class Map(Described):
     x, y : float64 arrays, shape (points,)
         The adaptive parameters, SI.
     ok, values, errors, passed
-        As of `Described`; `at` interpolates.
+        As of `Described`, with ``ranges``, ``shares`` and ``asked``; `at` interpolates.
     cells : float64 array, shape (cells, 4)
         Low x, low y, high x and high y of the cells between the points, SI.
     jumps : dict of str to bool array, each shape (cells,)
@@ -54,6 +54,9 @@ class Map(Described):
     ok: Bools
     values: dict[str, Floats]
     errors: dict[str, float | None]
+    ranges: dict[str, float]
+    shares: dict[str, float]
+    asked: float
     passed: bool
     cells: Floats
     jumps: dict[str, Bools]
@@ -150,7 +153,7 @@ class MapRefiner(Refiner):
 
     def _tree(self) -> Tree:
         if self._own is None:
-            self._own = tree(self.samples, self.samples.ranges())
+            self._own = tree(self.samples, self.samples.scales())
         return self._own
 
 
@@ -161,28 +164,29 @@ def describe_maps(plan: RefinePlan, rows: Rows) -> list[Map]:
     """
     samples = Samples(plan)
     samples.add(rows)
-    return _maps(samples, tree(samples, samples.ranges()))
+    return _maps(samples, tree(samples, samples.scales()))
 
 
 def _maps(samples: Samples, own: Tree) -> list[Map]:
     errors, jumps = _judged(samples, own)
-    maps = []
+    maps, measures = [], list(zip(*samples.measures(), strict=True))
     for index in range(len(samples.known)):
         here = own.leaves.map == index
-        maps.append(_map(samples, index, own.leaves[here], errors[here], jumps[here], bool(own.resolved[here].all())))
+        judged = own.leaves[here], errors[here], jumps[here], bool(own.resolved[here].all())
+        maps.append(_map(samples, index, *judged, *measures[index]))
     return maps
 
 
 def _judged(samples: Samples, own: Tree) -> tuple[Floats, Bools]:
     """Estimated errors and jumps of all leaves, both of shape (cells, results)."""
     error, cells = samples.plan.error, own.leaves
-    ranges = samples.ranges()[cells.map]
+    scales = samples.scales()[cells.map]
     corners = np.stack([samples.values[place] for place in cells.corners()])
     widths = np.max([samples.widths[place] for place in cells.corners()], axis=0)
-    errors, jumps = np.zeros_like(ranges), np.zeros(ranges.shape, dtype=bool)
+    errors, jumps = np.zeros_like(scales), np.zeros(scales.shape, dtype=bool)
     for axis, size in enumerate((cells.width, cells.height)):
         pairs = ((0, 1), (2, 3)) if axis == 0 else ((0, 2), (1, 3))
-        rise = np.max([np.abs(corners[end] - corners[start]) for start, end in pairs], axis=0) / ranges
+        rise = np.max([np.abs(corners[end] - corners[start]) for start, end in pairs], axis=0) / scales
         own_difference = cells.difference[:, axis]
         # Of the finest width there are no midpoints: what the ancestor missed may lie in the other half.
         halved = (size == 1)[:, None]
@@ -191,11 +195,22 @@ def _judged(samples: Samples, own: Tree) -> tuple[Floats, Bools]:
         # While a cell is open, only what rises may be a jump.
         jumps |= (estimate > error) & (own.resolved[:, None] | (rise > error))
     missing = ~np.isfinite(corners).all(axis=0)
-    return errors, jumps | missing | (widths > error * ranges)
+    return errors, jumps | missing | (widths > error * scales)
 
 
-def _map(samples: Samples, index: int, cells: Cells, errors: Floats, jumps: Bools, resolved: bool) -> Map:
+def _map(
+    samples: Samples,
+    index: int,
+    cells: Cells,
+    errors: Floats,
+    jumps: Bools,
+    resolved: bool,
+    ranges: Floats,
+    shares: Floats,
+) -> Map:
     plan = samples.plan
+    # As of curves: relative to the ranges.
+    errors = errors * (shares / plan.error)
     places = np.nonzero(samples.known[index])
     values = samples.values[index][places]
     x, y = (axis.at(own, plan.finest) for axis, own in zip(plan.adaptive, places, strict=True))
@@ -214,6 +229,9 @@ def _map(samples: Samples, index: int, cells: Cells, errors: Floats, jumps: Bool
             name: _largest_of(errors[~jumps[:, k], k]) if present[k] and len(cells) else None
             for k, name in enumerate(plan.results)
         },
+        ranges=dict(zip(plan.results, ranges.tolist(), strict=True)),
+        shares=dict(zip(plan.results, shares.tolist(), strict=True)),
+        asked=plan.error,
         passed=resolved and whole,
         cells=np.stack(edges, axis=1),
         jumps={name: jumps[:, k] for k, name in enumerate(plan.results)},

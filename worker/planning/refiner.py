@@ -105,6 +105,7 @@ class Refiner(ABC):
         return {
             "kind": REFINE,
             "asked": self.plan.error,
+            **({"each": True} if self.plan.errors else {}),
             "error": largest(one.error for one in every if one.ok.any() or not len(one.ok)),
             "cases": int(known.sum()),
             "failed": int((known & ~self.samples.ok).sum()),
@@ -125,6 +126,12 @@ class Described(ABC):
     errors : dict of str to float or None
         Estimated largest error of the interpolation, relative to the range of the result, outside the jumps; None
         where it is not known.
+    ranges : dict of str to float
+        Range of each result, in its unit (SI).
+    shares : dict of str to float
+        Error that each result may have, relative to its range.
+    asked : float
+        The error of the plan, which results without an error of their own may have.
     passed : bool
         Whether everything is resolved: the error is at most that asked, outside the jumps.
     """
@@ -132,12 +139,23 @@ class Described(ABC):
     ok: NDArray[np.bool_]
     values: dict[str, NDArray[np.float64]]
     errors: dict[str, float | None]
+    ranges: dict[str, float]
+    shares: dict[str, float]
+    asked: float
     passed: bool
 
     @property
     def error(self) -> float | None:
-        """The largest of the errors of the results that there are; None where one is not known."""
-        return largest(self.errors[name] for name, values in self.values.items() if np.isfinite(values).any())
+        """The largest of the errors of the results that there are; None where one is not known.
+
+        Errors of results with an error of their own are as large, relative to the one of the plan, as to their own.
+        """
+        every = []
+        for name, values in self.values.items():
+            if np.isfinite(values).any():
+                error, share = self.errors[name], self.shares[name]
+                every.append(error if error is None or share == self.asked else error / share * self.asked)
+        return largest(every)
 
     @abstractmethod
     def to_json(self) -> dict[str, Any]:

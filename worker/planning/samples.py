@@ -114,3 +114,20 @@ class Samples:
         size = _CONSTANT * np.maximum(np.abs(low), np.abs(high))
         ranges = np.where(present.any(axis=1), np.maximum(high - low, size), 1.0)
         return np.where(ranges > 0.0, ranges, 1.0)
+
+    def scales(self) -> Floats:
+        """What differences are measured by, shape (combinations, results): the error of the plan is allowed of it.
+
+        It is the range of a result, unless the result has an error of its own.
+        """
+        ranges, shares = self.measures()
+        return ranges * (shares / self.plan.error)
+
+    def measures(self) -> tuple[Floats, Floats]:
+        """Range of each result, and the error it may have relative to it; both of shape (combinations, results)."""
+        ranges, shares = self.ranges(), np.full((len(self.values), len(self.plan.results)), self.plan.error)
+        for k, name in enumerate(self.plan.results):
+            bound = self.plan.errors.get(name)
+            if bound is not None:
+                shares[:, k] = bound.value / (ranges[:, k] if bound.absolute else 1.0)
+        return ranges, shares

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal, Self
 
 from sprag_study.service.client.case_tables import measured_of
-from sprag_study.service.client.drafts import Draft, Entries, Quantity, Results, known, results_of
+from sprag_study.service.client.drafts import Draft, Entries, Quantity, Results, known, refined_results, results_of
 
 
 class Studies(Draft):
@@ -18,7 +18,7 @@ class Studies(Draft):
     def refine(
         self,
         *,
-        results: str | Sequence[str],
+        results: Results,
         error: Quantity | None = None,
         start: int | None = None,
         finest: Any | None = None,
@@ -29,7 +29,7 @@ class Studies(Draft):
         Parameters
         ----------
         results : values
-            The results that must be accurate to within the error.
+            The results that must be accurate to within the error, or to within an error of their own.
         error : number or text with a unit, optional
             Largest error of straight lines between the points, relative to the range of the result: 0.01 % to 20 %.
         start : int, optional
@@ -40,13 +40,7 @@ class Studies(Draft):
             Bound of the cases of all rounds.
         """
         return self._with(
-            refine=known(
-                results=[results] if isinstance(results, str) else results,
-                error=error,
-                start=start,
-                finest=finest,
-                most=most,
-            )
+            refine=known(results=refined_results(results), error=error, start=start, finest=finest, most=most)
         )
 
     def goal(

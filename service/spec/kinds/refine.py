@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
@@ -11,32 +12,42 @@ from sprag_study.service.spec.axes.axes import ADAPTIVE, axis_values, check_path
 from sprag_study.service.spec.axes.design import AXES
 from sprag_study.service.spec.described import Described, Listed, Record
 from sprag_study.service.spec.kinds.draft import Kind
-from sprag_study.service.spec.kinds.fields import RESULT, read_ends, read_numeric_result, read_path_of
+from sprag_study.service.spec.kinds.fields import RESULT, read_ends, read_numeric_result, read_path_of, read_value
+from sprag_study.service.spec.shares import in_percent
 from sprag_study.worker.errors import WrongPlanError
 from sprag_study.worker.limits import MAX_PLANNED_CASES
 from sprag_study.worker.models import regime_info
-from sprag_study.worker.planning.refine_plan import AdaptiveAxis, FixedAxis, RefinePlan
+from sprag_study.worker.planning.refine_plan import AdaptiveAxis, ErrorBound, FixedAxis, RefinePlan
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from sprag_study.service.spec.kinds.draft import Draft, Finish
     from sprag_study.service.spec.node import Node
+    from sprag_study.worker.models import ResultInfo
 
 #: Largest error that can be asked for, and the smallest.
 MIN_ERROR, MAX_ERROR = 1e-4, 0.2
 MIN_FINEST, MAX_FINEST = 16, 4096
 #: Values of each adaptive axis in the first round, unless they are given, for one adaptive axis and for two.
 STARTS: Final = {1: 17, 2: 9}
-_RESULTS: Final = "the results that must be accurate to within the error"
+_RESULTS: Final = "the results that must be accurate to within the error, or to within an error of their own"
 _ERROR: Final = "largest error of straight lines between the points, relative to the range of the result"
 _START: Final = (
     f"values of an adaptive axis in the first round, a power of 2 and 1; by default {STARTS[1]}, of a map {STARTS[2]}"
 )
 _FINEST: Final = "smallest interval, as a fraction of the axis, one over a power of 2"
+_OF_RESULT: Final = (
+    "largest error of this result: a share of its range with %, otherwise a value of the result, with or without a unit"
+)
+OF_RESULT: Final = Record(
+    {"result": RESULT, "error": {"type": ["number", "string"], "description": _OF_RESULT, "examples": ["0.5 rad/s"]}},
+    "a result with an error of its own",
+    required=("result", "error"),
+)
 REFINE: Final = Record(
     {
-        "results": Listed("results", 1, 16, _RESULTS, item=RESULT),
+        "results": Listed("results", 1, 16, _RESULTS, item={"anyOf": [RESULT, OF_RESULT.schema()]}),
         "error": Described(
             "error", "Error", _ERROR, "text", default="1 %",
             limits=f"{100.0 * MIN_ERROR:g} % to {100.0 * MAX_ERROR:g} %",
@@ -140,7 +151,7 @@ def _read_plan(node: Node, axes: RefinedAxes) -> RefinePlan | None:
         return None
     fixed, adaptive = axes
     infos, fields = node.report.results, REFINE.described
-    results = _read_results(REFINE.items(node, "results"))
+    results, errors = _read_results(REFINE.items(node, "results"))
     error = node["error"].otherwise(fields["error"].default).share(MIN_ERROR, MAX_ERROR)
     finest = _read_finest(node["finest"].otherwise(fields["finest"].default))
     start = fields["start"].read(node) if "start" in node else STARTS[len(adaptive)]
@@ -154,7 +165,7 @@ def _read_plan(node: Node, axes: RefinedAxes) -> RefinePlan | None:
     widths = tuple(name for name in results if any(info.name == f"{name}.half_width" for info in infos))
     try:
         plan = RefinePlan(
-            tuple(results), error, start, finest, adaptive, fixed, most, regime_info(infos) is not None, widths
+            tuple(results), error, start, finest, adaptive, fixed, most, regime_info(infos) is not None, widths, errors
         )
     except WrongPlanError as wrong:
         node.refuse("too-many", wrong.message, None, allowed="fewer curves, results or intervals")
@@ -169,16 +180,38 @@ def _read_plan(node: Node, axes: RefinedAxes) -> RefinePlan | None:
     return plan
 
 
-def _read_results(items: Sequence[Node]) -> list[str]:
-    """Names of results that are numbers, each once; faults are recorded."""
+def _read_results(items: Sequence[Node]) -> tuple[list[str], dict[str, ErrorBound]]:
+    """Names of results that are numbers, each once, and the errors that some have; faults are recorded."""
     names: list[str] = []
+    errors: dict[str, ErrorBound] = {}
     for item in items:
-        info = read_numeric_result(item)
+        of_result = isinstance(item.value, Mapping)
+        if of_result and not OF_RESULT.read(item):
+            continue
+        named = item["result"] if of_result else item
+        info = read_numeric_result(named)
         if info is not None and info.name in names:
-            item.refuse("repeated", "is named twice", allowed="each result once")
+            named.refuse("repeated", "is named twice", allowed="each result once")
         elif info is not None:
             names.append(info.name)
-    return names
+            bound = _read_bound(item["error"], info) if of_result else None
+            errors |= {} if bound is None else {info.name: bound}
+    return names, errors
+
+
+def _read_bound(node: Node, info: ResultInfo) -> ErrorBound | None:
+    """The error of one result: "2 %" of its range, or a value; None, and a fault recorded, where it is neither."""
+    if not node.given:
+        node.refuse("required", "is required", allowed='a share such as "2 %", or a value of the result')
+        return None
+    if in_percent(node.value) is not None:
+        share = node.share(MIN_ERROR, MAX_ERROR)
+        return None if share is None else ErrorBound(share)
+    value = read_value(node, info)
+    if value is not None and not (0.0 < value < math.inf):
+        node.refuse("out-of-range", "is out of range", value, allowed="above 0")
+        return None
+    return None if value is None else ErrorBound(value, absolute=True)
 
 
 def _read_finest(node: Node) -> int | None:

@@ -33,7 +33,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal, Self, TypedDict
 
 from sprag_study.service.client.case_tables import measured_of
-from sprag_study.service.client.drafts import Draft, Entries, Quantity, Results, known, results_of
+from sprag_study.service.client.drafts import Draft, Entries, Quantity, Results, known, refined_results, results_of
 '''
 
 Schema = Mapping[str, Any]
@@ -146,6 +146,11 @@ def _has(items: Schema, field: str) -> bool:
     return field in items.get("properties", {}) or any(_has(part, field) for part in items.get("anyOf", ()))
 
 
+def _has_names(items: Schema) -> bool:
+    """Whether some items of a list are plain names."""
+    return any(part.get("type") == "string" for part in items.get("anyOf", ()))
+
+
 def _is_table(schema: Schema) -> bool:
     """Whether a value is a table, which a spec has as the text of a CSV file, and nothing else."""
     return [*schema.get("properties", ())] == ["csv"]
@@ -160,7 +165,7 @@ def _value(name: str, schema: Schema) -> str:
             alone = "plus_minus" if _has(schema["items"], "plus_minus") else "values"
             return f"self._entries({name}, {alone!r})"
         case "Results":
-            return f"results_of({name})"
+            return f"{'refined_results' if _has_names(schema['items']) else 'results_of'}({name})"
         case "str | Sequence[str]":
             return f"[{name}] if isinstance({name}, str) else {name}"
     return name

@@ -170,6 +170,11 @@ def test_other_studies_and_fields_are_written_too() -> None:
     refined = drive().vary(load={"adaptive": ["0 N*m", "1 N*m"]}).refine(results="shaft.speed.mean")
     assert refined["refine"] == {"results": ["shaft.speed.mean"]}
     assert cases(refined) > 1
+    errors = {"torque.max": None, "shaft.speed.mean": "0.5 rad/s", "efficiency": 0.005}
+    listed = ["torque.max", *({"result": name, "error": error} for name, error in errors.items() if error)]
+    for results in (errors, listed):
+        assert refined.refine(results=results)["refine"] == {"results": listed}
+    assert cases(refined.refine(results=errors)) == 17
     assert cases(sprag.Shaft.of("press").vary(mean_speed=["60 rpm"])) == 13
 
 

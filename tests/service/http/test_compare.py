@@ -100,6 +100,17 @@ def test_inputs_are_compared_in_the_units_of_the_reader(service: Service) -> Non
     assert "spring_rate" not in table(soft, same, units="si")
 
 
+def test_errors_of_single_results_are_compared(service: Service) -> None:
+    def asking(error: str) -> str:
+        items = ["efficiency", {"result": "shaft.speed.mean", "error": error}]
+        axes = [{"path": X, "adaptive": [0, "1 N*m"]}]
+        return service.submit({**SPEC, "axes": axes, "refine": {"results": items}, "name": error})
+
+    page = service.http.get("/compare", params={"study": [asking("60 rpm"), asking("2 %")], "units": "typed"}).text
+    cells = "<td>1 %; Mean shaft speed 60 rpm</td><td>1 %; Mean shaft speed 2 %</td>"
+    assert f'title="refine.error">Largest error</th>{cells}' in page
+
+
 def test_inputs_are_named_by_the_model_that_has_them_and_read_as_its_study_typed_them(service: Service) -> None:
     def made(name: str) -> str:
         file, text = preset_text(name)

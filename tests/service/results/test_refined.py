@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from sprag_study.service.cli.shown import show_curves
 from sprag_study.service.figures.curves import curves_figure
 from sprag_study.service.figures.figure import BANDS, Figure, Line
 from sprag_study.service.figures.svg import svg
@@ -159,6 +160,39 @@ def test_a_sentence_tells_how_right_the_curves_are(study: Study) -> None:
     assert told.endswith(f" No error was asked for {TORQUE}.")
 
 
+def test_each_result_with_an_error_of_its_own_is_told_by_it(capsys: pytest.CaptureFixture[str]) -> None:
+    errors = [{"result": SPEED, "error": "60 rpm"}, {"result": EFFICIENCY, "error": "4 %"}]
+    study = study_of({**SPEC, "refine": {"results": [TORQUE, *errors], "error": "2 %"}})
+    curves = drawn(study, y=(SPEED, EFFICIENCY, TORQUE))
+    data = curves.to_json()
+    rpm = np.pi / 30.0
+    assert data["error_asked"] == 0.02
+    assert data["errors_asked"] == {
+        SPEED: {"value": pytest.approx(60.0 * rpm), "absolute": True},
+        EFFICIENCY: {"value": 0.04, "absolute": False},
+    }
+    # The speed falls from 30 to 10 rad/s, at 20 Hz to 2 rad/s; lines over a parabola are off by a quarter at most.
+    for curve, values in zip(data["curves"], (28.0, 20.0), strict=True):
+        relative, absolute = curve["error"][SPEED], curve["error_absolute"][SPEED]
+        assert relative is not None
+        assert absolute == pytest.approx(values * relative)
+        assert curve["error_absolute"][EFFICIENCY] == curve["error"][EFFICIENCY]
+        assert absolute < 60.0 * rpm
+    told = curves_figure([("", curves)]).below.said(Reading(study.model, Units({"rad/s": "rpm"})))
+    torque, speed, efficiency = (
+        told.index(text) for text in ("Largest clutch torque: ", "Mean shaft speed: ", "Efficiency: ")
+    )
+    assert torque < speed < efficiency
+    assert told[torque:].startswith("Largest clutch torque: Within 2 % of the range, as asked (estimate: ")
+    assert told[speed:].startswith("Mean shaft speed: Within 60 rpm, as asked, outside 1 jump (")
+    assert told[efficiency:].startswith("Efficiency: Within 4 % of the range, as asked (estimate: ")
+    show_curves(data)
+    shown = capsys.readouterr().err
+    assert f"error of {EFFICIENCY}: " in shown
+    assert ", 4 % asked" in shown
+    assert ", 6.2832 rad/s asked" in shown
+
+
 def test_a_study_that_is_not_done_says_what_it_has_not_reached() -> None:
     study = study_of(rounds=2)
     told = curves_figure([("", drawn(study))]).below
@@ -204,6 +238,10 @@ def test_a_sentence_says_when_the_bound_of_cases_ended_the_rounds() -> None:
     record = RoundRecord(1, range(3, 3), summary, datetime(2026, 1, 1, tzinfo=UTC))
     assert sentence(RoundProgress(record, 5, 3), StudyState.FINISHED) == (
         "1 round, error not known, asked 1 %, not reached with the cases allowed"
+    )
+    several = RoundRecord(1, range(3, 5), {**summary, "error": 0.021, "each": True}, record.planned_at)
+    assert sentence(RoundProgress(several, 5, 9), StudyState.RUNNING) == (
+        "round 2 of at most 5, largest error 2.1 times the one asked"
     )
     ended = RoundRecord(1, range(3, 3), {**summary, "error": 0.004, "passed": True}, record.planned_at)
     assert sentence(RoundProgress(ended, 5, 3), StudyState.FINISHED) == "1 round, error 0.4 %, asked 1 %"

@@ -157,6 +157,28 @@ def test_the_pages_and_files_of_a_service(service: Service, capsys: pytest.Captu
     assert table.splitlines()[0] == f"{MASS},{FREQUENCY},{LOAD},{EFFICIENCY},ending"
 
 
+def test_a_map_is_told_by_the_absolute_error_of_its_result(capsys: pytest.CaptureFixture[str]) -> None:
+    results = [{"result": SPEED, "error": "0.3 rad/s"}, EFFICIENCY]
+    study = study_of({**MAP, "refine": {**MAP["refine"], "results": results}})
+    data = drawn(study, 0.5).to_json()
+    error, absolute = data["error"], data["error_absolute"]
+    assert (data["error_asked"], data["error_asked_absolute"]) == (0.3, True)
+    # 20 to 30 rad/s without load, 10 rad/s less at the largest load.
+    assert error is not None
+    assert absolute == pytest.approx(20.0 * error)
+    assert 0.0 < absolute <= 0.3
+    found = drawn(study, 0.5)
+    assert np.nanmax(np.abs(found.values - truth(found, 0.5))) <= absolute
+    show_map(data)
+    assert f"error: {absolute:.2g} rad/s, 0.3 rad/s asked" in capsys.readouterr().err
+    known = found.refined
+    assert known is not None
+    assert str(known.sentence).startswith("Within 0.3 rad/s, as asked (estimate: ")
+    other = drawn(study, 0.5, z=EFFICIENCY).to_json()
+    assert other["error_asked"] == 0.02
+    assert "error_asked_absolute" not in other
+
+
 def test_the_squares_of_a_settled_map_have_no_regimes(service: Service) -> None:
     study_id = service.submit({**MAP, "run": {"until": "settled"}})
     query = {"x": LOAD, "y": FREQUENCY, "z": SPEED, "at": f"{MASS}=0.4", "format": "csv"}

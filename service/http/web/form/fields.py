@@ -79,7 +79,10 @@ def run_fields(form: Form) -> dict[str, Field]:
 def refine_fields() -> dict[str, Field]:
     """The fields of a refinement, by name."""
     entries = refine.REFINE.described
-    meaning = _("{what}, separated by semicolons", what=_(refine.REFINE.listed["results"].help))
+    meaning = _(
+        "{what}, separated by semicolons; the error of a result follows its name, as in torque.max 0.2 N*m",
+        what=_(refine.REFINE.listed["results"].help),
+    )
     own = [
         Field("/refine/results", _("Results"), meaning, required=True, example="shaft.speed.mean; efficiency"),
         described(entries["error"], "/refine"),

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Final
@@ -62,6 +62,8 @@ GOAL_DEFAULTS: Final[Values] = {
 _COUNT_DIGITS: Final = 7
 #: Entries of an axis that are ranges without a step, and their spacing.
 _SPACINGS: Final[dict[str, Spacing]] = {"linspace": "even", "geomspace": "geometric", "adaptive": "refined"}
+#: A result, and behind it the error that it may have.
+_WITH_ERROR: Final = re.compile(r"\s*(?P<name>[^\s,;:]+)\s*[:\s]\s*(?P<error>[-+.0-9].*?)\s*")
 #: Kinds of limits with their labels.
 LIMITS: Final = (("at_most", N_("at most")), ("at_least", N_("at least")), ("is", N_("equal to")))
 #: Kinds of conditions by which cases are left out, with their labels.
@@ -154,6 +156,20 @@ def _variable_text(item: Mapping[str, Any]) -> Values:
     if "values" in item:
         return {"values": list_text(item["values"])}
     return {"values": TypedRange(text_of(item["from"]), text_of(item["to"])).text}
+
+
+def _refined_results(text: str) -> list[Any]:
+    """Results that are refined, of which some have an error behind their name: ``efficiency; torque.max 0.2 N*m``."""
+    found: list[Any] = []
+    for part in text.split(";"):
+        own = _WITH_ERROR.fullmatch(part)
+        found += names_of(part) if own is None else [{"result": own["name"], "error": plain(own["error"])}]
+    return found
+
+
+def _refined_text(items: Sequence[Any]) -> str:
+    texts = (item if isinstance(item, str) else f"{item['result']} {text_of(item['error'])}" for item in items)
+    return "; ".join(texts)
 
 
 def _limit(form: Filled) -> dict[str, Any]:
@@ -501,8 +517,8 @@ _GOAL: Final = Record(
     whole="", key="goal", when=is_search, new=GOAL_DEFAULTS,
 )  # fmt: skip
 _REFINE: Final = Record(
-    (typed("results", names_of, "; ".join), *described(REFINE.described.values())), whole="/results", key="refine",
-    when=is_refined, new=REFINE_DEFAULTS,
+    (typed("results", _refined_results, _refined_text), *described(REFINE.described.values())),
+    whole="/results", key="refine", when=is_refined, new=REFINE_DEFAULTS,
 )  # fmt: skip
 _CASES: Final = Record(
     (_Axes(), PARTS["exclude"], chosen("combine", "grid", always=True), _REFINE),

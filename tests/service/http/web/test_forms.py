@@ -66,7 +66,16 @@ REFINED = changed(
             {"path": "excitation.frequency", "values": [20, 25]},
             {"path": "shaft.load", "adaptive": [0, "1.2 N*m"]},
         ],
-        "/refine": {"results": ["shaft.speed.mean", "efficiency"], "error": "2 %", "finest": "1/64", "most": 300},
+        "/refine": {
+            "results": [
+                "shaft.speed.mean",
+                {"result": "torque.max", "error": "0.2 N*m"},
+                {"result": "efficiency", "error": 0.005},
+            ],
+            "error": "2 %",
+            "finest": "1/64",
+            "most": 300,
+        },
     }
 )
 
@@ -96,6 +105,8 @@ def test_an_axis_that_is_refined_asks_for_results_and_an_error() -> None:
     [
         ("/refine/results", "", "is required"),
         ("/refine/results", "shaft.speed.mean; speed", "speed"),
+        ("/refine/results", "shaft.speed.mean; efficiency 30 %", "out of range"),
+        ("/refine/results", "shaft.speed.mean 2 N*m", "rad/s"),
         ("/refine/error", "90 %", "out of range"),
         ("/refine/start", "16", "power of 2"),
         ("/refine/finest", "1/100", "power of 2"),

@@ -48,6 +48,21 @@ def test_a_refined_study_has_its_plan_and_its_first_round() -> None:
     assert Study.from_text(study.to_text()) == study
 
 
+def test_a_result_may_have_an_error_of_its_own() -> None:
+    results = [
+        "torque.max",
+        {"result": "shaft.speed.mean", "error": "60 rpm"},
+        {"result": "efficiency", "error": "2 %"},
+    ]
+    plan = parsed(refined({"/refine/results": results})).study.plan
+    assert plan is not None
+    assert plan["results"] == ["torque.max", "shaft.speed.mean", "efficiency"]
+    assert plan["errors"] == {
+        "shaft.speed.mean": {"value": pytest.approx(2.0 * np.pi), "absolute": True},
+        "efficiency": {"value": 0.02, "absolute": False},
+    }
+
+
 def test_settled_studies_are_refined_by_their_regimes() -> None:
     study = parsed(refined({"/run": {}})).study
     assert study.plan is not None
@@ -88,6 +103,10 @@ def test_ends_may_be_given_in_any_order_and_unit_and_fields_have_defaults() -> N
         ({"/refine/results": ["torque.max", "torque.max"]}, "/refine/results/1", "repeated"),
         ({"/refine/error": "30 %"}, "/refine/error", "out-of-range"),
         ({"/refine/error": "small"}, "/refine/error", "not-a-number"),
+        ({"/refine/results/0": {"result": "efficiency"}}, "/refine/results/0/error", "required"),
+        ({"/refine/results/0": {"result": "efficiency", "error": "30 %"}}, "/refine/results/0/error", "out-of-range"),
+        ({"/refine/results/0": {"result": "efficiency", "error": -0.1}}, "/refine/results/0/error", "out-of-range"),
+        ({"/refine/results/0": {"result": "efficiency", "error": "1 s"}}, "/refine/results/0/error", "wrong-type"),
         ({"/refine/start": 6}, "/refine/start", "out-of-range"),
         ({"/refine/start": 129}, "/refine/start", "out-of-range"),
         ({"/refine/finest": "1/60"}, "/refine/finest", "out-of-range"),
