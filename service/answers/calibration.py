@@ -55,6 +55,39 @@ class NextMeasurement(TypedDict):
     narrower: Annotated[dict[str, float], Doc("by how much each standard deviation would shrink, 0 to 1")]
 
 
+class LackOfFit(TypedDict):
+    """A test for lack of fit, of the result that fits worst."""
+
+    result: str
+    test: Annotated[str, Doc("pure error: the F test against the scatter of repeated points; runs: of the residuals")]
+    statistic: Annotated[float, Doc("F, or the number of runs of residuals of the same sign")]
+    freedom: Annotated[
+        list[float], Doc("degrees of freedom of lack of fit and pure error; or how many residuals are above and below")
+    ]
+    p: Annotated[float, Doc("probability of such a value where the model is right, times the number of tests")]
+
+
+class FarPoint(TypedDict):
+    """The measured value that is farthest off what the others say."""
+
+    number: Annotated[int, Doc("its place among `points`, from 1")]
+    deleted_residual: Annotated[float, Doc("residual in standard deviations that follow from the other values")]
+    cook: Annotated[float, Doc("Cook's distance: how far the value moves the fit")]
+    p: Annotated[float, Doc("probability of such a residual of any value where all scatter alike")]
+
+
+class SensorOffset(TypedDict):
+    """What an offset of the sensor of a result, as a further unknown, would do to the fit, linearised."""
+
+    result: str
+    offset: Annotated[float, Doc("measured less modelled, SI")]
+    deviation: Annotated[float, Doc("its standard deviation, SI")]
+    p: Annotated[float, Doc("probability of such an offset where there is none, times the number of results")]
+    p_after: Annotated[
+        float, Doc("that of the residuals it leaves, where the model is right; 1 where no test is possible")
+    ]
+
+
 class CalibrationCurvePoint(TypedDict):
     """The fit at a condition between or around the measured ones."""
 
@@ -80,5 +113,10 @@ class CalibrationReport(TypedDict):
     points: list[CalibrationPoint]
     directions: list[CalibrationDirection]
     next: NextMeasurement | None
+    lack_of_fit: Annotated[
+        LackOfFit | None, Doc("null where sigma is given and chi-square says it, or where there are too few points")
+    ]
+    far_point: Annotated[FarPoint | None, Doc("null where sigma is given, or with another loss than linear")]
+    offsets: Annotated[list[SensorOffset], Doc("of each result that the parameters cannot imitate")]
     curve: list[CalibrationCurvePoint]
     sentences: Annotated[list[str], Doc("what should be known before the values are used")]

@@ -18,6 +18,7 @@ from sprag_study.worker import models
 from sprag_study.worker.models import WorkerEnding
 from sprag_study.worker.planning.calibrate import CalibratePlan, CalibratePlanner
 from sprag_study.worker.planning.calibrate.answer import Answer, Direction, answer
+from sprag_study.worker.planning.calibrate.lack_of_fit import CHANCE, FarValue, FitTest, far_value, lack_of_fit
 from sprag_study.worker.planning.calibrate.plan import CALIBRATE
 from sprag_study.worker.planning.calibrate.stored import from_json
 from sprag_study.worker.planning.rounds import Rows
@@ -33,7 +34,10 @@ if TYPE_CHECKING:
         CalibrationDirection,
         CalibrationPoint,
         CalibrationReport,
+        FarPoint,
+        LackOfFit,
         NextMeasurement,
+        SensorOffset,
     )
     from sprag_study.service.reading.quantities import Units
     from sprag_study.service.results.curves import Fetch
@@ -66,6 +70,22 @@ class Calibration:
     answer: Answer | None
     summary: dict[str, Any]
     converged: int
+
+    @property
+    def test(self) -> FitTest | None:
+        """The test for lack of fit; None where chi-square says as much, or where points are too few."""
+        known = self.answer
+        if known is None or self.plan.known_sigma:
+            return None
+        return lack_of_fit(self.plan, known.residuals, known.sigma, known.leverages)
+
+    @property
+    def far(self) -> FarValue | None:
+        """The value that is farthest off the others; None where sigma says how far each is."""
+        known = self.answer
+        if known is None or self.plan.known_sigma:
+            return None
+        return far_value(self.plan, known.residuals, known.leverages)
 
     @property
     def sentences(self) -> list[str]:
@@ -141,6 +161,9 @@ def calibration_json(study_id: str, found: Calibration) -> CalibrationReport:
         "points": [_point(found, index) for index in range(plan.count)],
         "directions": [] if known is None else [_direction(found, index) for index in range(len(known.directions))],
         "next": _next(found),
+        "lack_of_fit": _lack(found),
+        "far_point": _far(found),
+        "offsets": _offsets(found),
         "curve": _curve(found),
         "sentences": found.sentences,
     }
@@ -217,6 +240,39 @@ def _next(found: Calibration) -> NextMeasurement | None:
     }
 
 
+def _lack(found: Calibration) -> LackOfFit | None:
+    test = found.test
+    if test is None:
+        return None
+    return {
+        "result": found.plan.results[test.column],
+        "test": test.test,
+        "statistic": test.statistic,
+        "freedom": list(test.freedom),
+        "p": test.p,
+    }
+
+
+def _far(found: Calibration) -> FarPoint | None:
+    far = found.far
+    if far is None:
+        return None
+    return {"number": far.place + 1, "deleted_residual": far.deleted, "cook": far.cook, "p": far.p}
+
+
+def _offsets(found: Calibration) -> list[SensorOffset]:
+    return [
+        {
+            "result": found.plan.results[one.column],
+            "offset": one.value,
+            "deviation": one.deviation,
+            "p": one.p,
+            "p_after": one.rest,
+        }
+        for one in (found.answer.offsets if found.answer else ())
+    ]
+
+
 def _curve(found: Calibration) -> list[CalibrationCurvePoint]:
     known = found.answer
     if known is None or known.curve is None or known.others is None:
@@ -271,13 +327,75 @@ def sentences(found: Calibration) -> list[str]:
     if known is None:
         return []
     return [
+        *_fits(found),
         *_scatter(found, known),
+        *_shifted(found, known),
         *(_undetermined(found, one) for one in known.directions),
         *_bounds(found, known),
         *_points(found, known),
         *_refits(found, known),
         *_next_point(found, known),
     ]
+
+
+def _fits(found: Calibration) -> Iterator[Phrase]:
+    """Whether the residuals are chance, where no sigma says how large they may be."""
+    if found.plan.known_sigma:
+        return
+    test = found.test
+    if test is None:
+        yield Phrase("These points are too few to test whether the model fits: repeat some of them, or give sigma.")
+        return
+    values: dict[str, Part] = {
+        "name": Name(found.plan.results[test.column], within=True),
+        "p": Amount(test.p, "1", 2, form=".2g"),
+    }
+    if test.test == "runs":
+        values |= {"runs": round(test.statistic), "total": round(sum(test.freedom))}
+        if test.p < CHANCE:
+            yield Phrase(
+                "The {total} residuals of {name} keep their sign too long for chance ({runs} runs, p = {p}): the model "
+                "lacks something, or a value of the base is wrong, and the intervals are too narrow; free a further "
+                "parameter, or correct the base.",
+                **values,
+            )
+        else:
+            yield Phrase(
+                "The {total} residuals of {name} change their sign as by chance ({runs} runs, p = {p}): no lack of fit "
+                "shows.",
+                **values,
+            )
+        return
+    values["ratio"] = Amount(test.statistic, "1", 3, form=".3g")
+    if test.p < CHANCE:
+        yield Phrase(
+            "The fit misses {name} by more than repeated points scatter (F = {ratio}, p = {p}): the model lacks "
+            "something, or a value of the base is wrong, and the intervals are too narrow; free a further parameter, "
+            "or correct the base.",
+            **values,
+        )
+    else:
+        yield Phrase(
+            "The fit misses {name} by no more than repeated points scatter (F = {ratio}, p = {p}): no lack of fit "
+            "shows.",
+            **values,
+        )
+
+
+def _shifted(found: Calibration, known: Answer) -> Iterator[Phrase]:
+    """The offset that would explain the residuals."""
+    offset = min(known.offsets, key=lambda one: one.p, default=None)
+    if offset is not None and offset.p < _CHANCE and offset.rest >= _CHANCE:
+        result = found.plan.results[offset.column]
+        unit = found.infos[result].unit
+        yield Phrase(
+            "An offset of {name} by {offset} (standard deviation {deviation}) would explain the residuals (p = {p}): "
+            "check the zero of its sensor.",
+            name=Name(result, within=True),
+            offset=Amount(offset.value, unit, 3, form="+.3g"),
+            deviation=Amount(offset.deviation, unit, 2, form=".2g"),
+            p=Amount(offset.p, "1", 2, form=".2g"),
+        )
 
 
 def _scatter(found: Calibration, known: Answer) -> Iterator[Phrase]:
@@ -366,14 +484,35 @@ def _points(found: Calibration, known: Answer) -> Iterator[Phrase]:
             count=failed,
             total=found.plan.count,
         )
+    lone = found.far
+    if lone is not None and lone.p < CHANCE:
+        yield Phrase(
+            "Measured value {number} ({point}) is far off the others ({count} standard deviations, Cook's distance "
+            "{cook}, p = {p}): check it, or let outliers count less by `loss`, such as soft_l1.",
+            number=lone.place + 1,
+            point=_named(found, lone.place),
+            count=Amount(abs(lone.deleted), "1", 3, form=".3g"),
+            cook=Amount(lone.cook, "1", 2, form=".2g"),
+            p=Amount(lone.p, "1", 2, form=".2g"),
+        )
     residuals = np.where(known.failed, 0.0, known.residuals)
+    if lone is not None and lone.p < CHANCE:
+        residuals[lone.place] = 0.0
     far = [index for index in np.argsort(-np.abs(residuals)).tolist() if abs(residuals[index]) > _FAR]
     for index in far[:_MOST_POINTS]:
-        yield Phrase(
-            "Measured value {number} is {count} standard deviations off the fit.",
-            number=index + 1,
-            count=Amount(round(abs(residuals[index]), 1), "1", form=".1f"),
-        )
+        values: dict[str, Part] = {
+            "number": index + 1,
+            "point": _named(found, index),
+            "count": Amount(round(abs(residuals[index]), 1), "1", form=".1f"),
+        }
+        if found.plan.loss == "linear":
+            yield Phrase(
+                "Measured value {number} ({point}) is {count} standard deviations off the fit: check it, or let "
+                "outliers count less by `loss`, such as soft_l1.",
+                **values,
+            )
+        else:
+            yield Phrase("Measured value {number} ({point}) is {count} standard deviations off the fit.", **values)
     if len(far) > _MOST_POINTS:
         yield plural(
             "{count} further value is more than {limit} standard deviations off.",
@@ -381,6 +520,22 @@ def _points(found: Calibration, known: Answer) -> Iterator[Phrase]:
             len(far) - _MOST_POINTS,
             limit=Amount(_FAR, "1", form="g"),
         )
+
+
+def _named(found: Calibration, index: int) -> Phrase:
+    """A measured value by its condition and what was read there."""
+    conditions, columns = found.plan.places
+    result = found.plan.results[columns[index]]
+    read = {result: (float(found.plan.values[index]), found.infos[result].unit)}
+    at = _at(found, found.plan.at[conditions[index]])
+    every = {path: (value, unit_of(found.study, path)) for path, value in at.items()} | read
+    return joined(
+        ", ",
+        [
+            Phrase("{name} = {value}", name=Name(name, within=True), value=Amount(value, unit, 4, form=".4g"))
+            for name, (value, unit) in every.items()
+        ],
+    )
 
 
 def _refits(found: Calibration, known: Answer) -> Iterator[Phrase]:

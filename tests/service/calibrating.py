@@ -25,15 +25,16 @@ def speed(load: Any, frequency: Any, damping: Any, inertia: Any) -> Any:
     return frequency * (1.0 - load) - 300.0 * damping - 500.0 * inertia * load
 
 
-def measured() -> str:
-    """Measured points with a scatter of 0.05 rad/s, as CSV."""
+def measured(offset: float = 0.0, *, sigma: bool = True) -> str:
+    """Measured points with a scatter of 0.05 rad/s, as CSV, by a sensor with an offset."""
     scatter = np.random.default_rng(1).normal(size=2 * len(LOADS)).tolist()
     lines = [
-        f"{1e3 * load:g},{hertz},{speed(load, hertz, DAMPING, INERTIA) + 0.05 * scatter.pop():.4f},0.05"
+        f"{1e3 * load:g},{hertz},{speed(load, hertz, DAMPING, INERTIA) + offset + 0.05 * scatter.pop():.4f}"
+        + (",0.05" if sigma else "")
         for hertz in (24, 28)
         for load in LOADS
     ]
-    return "\n".join(["shaft.load [N*mm],excitation.frequency [Hz],shaft.speed.mean,sigma", *lines])
+    return "\n".join(["shaft.load [N*mm],excitation.frequency [Hz],shaft.speed.mean" + ",sigma" * sigma, *lines])
 
 
 CALIBRATE: dict[str, Any] = {

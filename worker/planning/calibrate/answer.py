@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sprag_study.worker.planning.calibrate.course import ENDED, leverages
 from sprag_study.worker.planning.calibrate.fit import quadratic
+from sprag_study.worker.planning.calibrate.lack_of_fit import Offset, offsets
 
 if TYPE_CHECKING:
     from sprag_study.worker.planning.calibrate.course import State
@@ -107,6 +108,8 @@ class Answer:
         (others, results, 2).
     ribbon_measured : array, shape (n, 2), optional
         The same at the measured values.
+    offsets : list of Offset
+        What an offset of each result would do.
     """
 
     complete: bool
@@ -129,6 +132,7 @@ class Answer:
     curve: Floats | None
     ribbon: Floats | None
     ribbon_measured: Floats | None
+    offsets: list[Offset] = field(default_factory=list)
 
 
 def answer(plan: CalibratePlan, space: Space, state: State) -> Answer | None:
@@ -143,7 +147,7 @@ def answer(plan: CalibratePlan, space: Space, state: State) -> Answer | None:
     enough = places is not None and len(places) >= LEAST_REFITS
     values = space.values(places) if enough and places is not None else None
     squares = np.where(failed, 0.0, residuals) ** 2
-    directions = _directions(space, state)
+    directions, leverage = _directions(space, state), leverages(data, best)
     loose = sorted({place for one in directions if one.undetermined for place in one.parameters})
     around = _likely(plan, state)
     intervals = None if values is None else _wider(_ends(values), space.values(around))
@@ -163,7 +167,7 @@ def answer(plan: CalibratePlan, space: Space, state: State) -> Answer | None:
         modelled=best.modelled[0],
         sigma=sigma,
         residuals=residuals,
-        leverages=leverages(data, best),
+        leverages=leverage,
         failed=failed,
         chi_square=float(squares.sum()),
         freedom=plan.freedom - int(failed.sum()),
@@ -174,6 +178,7 @@ def answer(plan: CalibratePlan, space: Space, state: State) -> Answer | None:
         curve=state.curve,
         ribbon=_ribbon(state.curves),
         ribbon_measured=None if state.refits is None or not enough else _ends(state.refits.modelled),
+        offsets=offsets(plan, residuals, sigma, leverage, best.derivatives[0]),
     )
 
 

@@ -13,6 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from sprag_study.worker.planning.calibrate.answer import Answer, Direction, NextPoint
+from sprag_study.worker.planning.calibrate.lack_of_fit import Offset
 
 _FLAGS: Final = frozenset({"at_bounds", "failed"})
 
@@ -24,6 +25,7 @@ def to_json(answer: Answer) -> dict[str, Any]:
     parts = {
         "directions": [asdict(one) for one in answer.directions],
         "next": None if answer.next is None else asdict(answer.next),
+        "offsets": [asdict(one) for one in answer.offsets],
     }
     return plain | arrays | parts
 
@@ -32,11 +34,12 @@ def from_json(data: Mapping[str, Any]) -> Answer:
     """The answer that `to_json` wrote; KeyError or TypeError when it is not one."""
     read = dict(data)
     for name, value in data.items():
-        if isinstance(value, list) and name != "directions":
+        if isinstance(value, list) and name not in {"directions", "offsets"}:
             read[name] = np.array(value, dtype=np.bool_ if name in _FLAGS else np.float64)
     read["directions"] = [
         Direction(tuple(one["parameters"]), tuple(one["changes"]), one["undetermined"]) for one in data["directions"]
     ]
+    read["offsets"] = [Offset(**one) for one in data.get("offsets", ())]  # earlier answers have none
     following = data["next"]
     if following is not None:
         parts = (tuple(following[name]) for name in ("condition", "spread", "narrower"))

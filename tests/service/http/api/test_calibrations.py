@@ -14,7 +14,7 @@ from sprag_study.service.report.document import report_of
 from sprag_study.service.results import calibration as calibration_module
 from sprag_study.service.results.calibration import calibration_json, calibration_of
 from sprag_study.service.views.library import Library
-from tests.service.calibrating import DAMPING, INERTIA, calibration
+from tests.service.calibrating import CALIBRATE, DAMPING, INERTIA, calibration, measured
 from tests.service.conftest import API, Service
 from tests.service.shapes import fits
 
@@ -77,6 +77,36 @@ def test_what_cannot_be_separated_is_named(service: Service) -> None:
     assert any("These points cannot separate" in sentence for sentence in found["sentences"])
     assert any("reaches" in sentence for sentence in found["sentences"])
     assert any("follows from the residuals" in sentence for sentence in found["sentences"])
+
+
+def test_a_sensor_that_does_not_read_zero_is_named_without_sigma(service: Service) -> None:
+    """With the damping given, which acts as the offset does."""
+    unknown, points = [CALIBRATE["unknown"][1]], {"csv": measured(0.8, sigma=False)}
+    study_id = calibration(service, unknown=unknown, measured=points, refits=0)
+    found = service.get(f"/studies/{study_id}/calibration")
+    fits(CalibrationReport, found)
+    assert found["lack_of_fit"]["test"] == "runs"
+    assert found["sentences"][0].startswith("The 10 residuals of shaft.speed.mean ")
+    (offset,) = found["offsets"]
+    assert abs(offset["offset"] - 0.8) < 3.0 * offset["deviation"]
+    assert offset["p"] < 0.01 < offset["p_after"]
+    (told,) = [text for text in found["sentences"] if text.startswith("An offset of shaft.speed.mean by +0.")]
+    assert "rad/s" in told
+    page = service.http.get(f"/studies/{study_id}/matters").text
+    assert "would explain the residuals (p = " in page
+
+
+def test_a_value_far_off_the_others_is_named_with_its_condition(service: Service) -> None:
+    lines = measured(sigma=False).splitlines()
+    place, value = lines[4].rsplit(",", 1)
+    lines[4] = f"{place},{float(value) + 1.0}"
+    study_id = calibration(service, measured={"csv": "\n".join(lines)}, refits=0)
+    found = service.get(f"/studies/{study_id}/calibration")
+    assert found["far_point"]["number"] == 4
+    assert found["far_point"]["p"] < 0.001
+    (told,) = [text for text in found["sentences"] if "far off the others" in text]
+    assert "Measured value 4 (shaft.load = 0.2 N*m, excitation.frequency = 24 Hz, shaft.speed.mean = " in told
+    assert "`loss`" in told
 
 
 def test_a_calibration_that_is_running_shows_what_it_knows(service: Service) -> None:
