@@ -74,12 +74,16 @@ def read_numeric_result(node: Node) -> ResultInfo | None:
     return info
 
 
-def read_value(node: Node, info: ResultInfo) -> float | None:
-    """A value of a result (SI; of a category its number); None, and a fault recorded, where it is none."""
+def read_value(node: Node, info: ResultInfo, *, share: bool = False) -> float | None:
+    """A value of a result (SI; of a category its number); None, and a fault recorded, where it is none.
+
+    ``share`` says that a share of the range, which the caller reads, could stand there too.
+    """
     if info.kind == "category":
         if node.value in info.categories:
             return float(info.categories.index(str(node.value)))
         node.refuse("invalid-choice", "is not a valid choice", allowed=quoted(info.categories))
         return None
     such = Sentence("{number}, for example {example}", number=number_in(info.unit), example=example(info.unit))
+    such = Sentence('{value}; or a share of its range, such as "2 %"', value=such) if share else such
     return node.parsed(lambda value: parse_quantity(value, info.unit), allowed=such, unit=info.unit)

@@ -202,12 +202,12 @@ def _read_results(items: Sequence[Node]) -> tuple[list[str], dict[str, ErrorBoun
 def _read_bound(node: Node, info: ResultInfo) -> ErrorBound | None:
     """The error of one result: "2 %" of its range, or a value; None, and a fault recorded, where it is neither."""
     if not node.given:
-        node.refuse("required", "is required", allowed='a share such as "2 %", or a value of the result')
+        node.refuse("required", "is required", allowed='a value of the result, or a share of its range such as "2 %"')
         return None
     if in_percent(node.value) is not None:
         share = node.share(MIN_ERROR, MAX_ERROR)
         return None if share is None else ErrorBound(share)
-    value = read_value(node, info)
+    value = read_value(node, info, share=True)
     if value is not None and not (0.0 < value < math.inf):
         node.refuse("out-of-range", "is out of range", value, allowed="above 0")
         return None

@@ -63,6 +63,12 @@ def test_a_result_may_have_an_error_of_its_own() -> None:
     }
 
 
+def test_a_wrong_error_of_a_result_is_told_what_may_stand_there() -> None:
+    results = [{"result": "shaft.speed.mean", "error": "small"}]
+    with pytest.raises(SpecError, match=r'a number of rad/s, for example .*; or a share of its range, such as "2 %"'):
+        parsed(refined({"/refine/results": results}))
+
+
 def test_settled_studies_are_refined_by_their_regimes() -> None:
     study = parsed(refined({"/run": {}})).study
     assert study.plan is not None
