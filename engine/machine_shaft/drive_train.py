@@ -93,6 +93,26 @@ class Train:
             "motor.power.mean": mean * speed,
         }  # fmt: skip
 
+    def heating(self, panels: Panels, drive: Floats, omega: Floats, rated: Floats) -> dict[str, Floats]:
+        """By what the motor warms, each (cases,): root mean squares over time, and the thermal margin.
+
+        The copper losses follow the square of the current, and that follows the torque: the constant torque that warms
+        the motor as much is the square root of the mean of M^2 over time, with dt = dphi/omega (G. K. Dubey,
+        *Fundamentals of Electrical Drives*, chapter 4; docs/theory-machine-shaft.md, "The motor's rating").
+
+        Parameters
+        ----------
+        panels : Panels
+        drive, omega : arrays, shape (cases, panels, nodes)
+            Driving torque in N*m and speed in rad/s of the main shaft.
+        rated : array, shape (cases,)
+            Rated torque of the motor in N*m; infinite where it is not known.
+        """
+        squares, time = np.square(self.at_motor(drive)), panels.integral(1.0 / omega)
+        torque = np.sqrt(panels.integral(squares / omega) / time)
+        power = np.broadcast_to(self.ratio[:, 0, 0], torque.shape) * np.sqrt(panels.integral(squares * omega) / time)
+        return {"motor.torque.rms": torque, "motor.power.rms": power, "motor.torque.margin": rated / torque}
+
     def at_shaft(self, torque: Floats) -> Floats:
         """Torque on the main shaft of a ``torque`` of the motor."""
         if self.direct:

@@ -167,6 +167,8 @@ _MOTOR = {
     ),
     "table": (Parameter("drive.motor.scale", "k_m", "1", 0.0, 1e12, True, 1.0, "factor on the torques of its table"),),
 }
+_RATED_HELP = "torque that it gives continuously (duty type S1), which determines its thermal margin"
+_RATED = Parameter("drive.motor.rated_torque", "M_N", "N*m", 0.0, 1e12, True, _INF, _RATED_HELP)
 
 _WHEEL = (
     _length("drive.flywheel.diameter", "D", "mean diameter of the rim, or outer diameter of the disc"),
@@ -315,7 +317,7 @@ def _part(prefix: str, part: PartChoice, cycle: int) -> tuple[Parameter, ...]:
 def _drive(spec: MachineSpec) -> tuple[Parameter, ...]:
     if spec.balance == "motor":
         rotor = _inertia("drive.motor.inertia", "J_m", "inertia of its rotor")
-        return (*_MOTOR[spec.drive.motor], rotor) if spec.drive.motor else ()
+        return (*_MOTOR[spec.drive.motor], rotor, _RATED) if spec.drive.motor else ()
     if spec.drive.form == "constant":
         return (Parameter("drive.torque", "M_d", "N*m", -_ANY, _ANY, False, 0.0, "driving torque"),)
     return (Parameter("drive.scale", "k_d", "1", -_ANY, _ANY, False, 1.0, "factor on the driving torque"),)

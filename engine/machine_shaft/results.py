@@ -89,6 +89,9 @@ MACHINE_RESULTS: tuple[ResultInfo, ...] = (
     _R("flywheel.required_mass", "kg", "mass of the flywheel at its diameter that gives the wanted irregularity"),
     _R("flywheel.required_diameter", "m", "diameter at which its mass or section gives the wanted irregularity"),
     _R("cycle.multiplier", "1", "factor by which a small deviation of the speed grows in a cycle: stable below 1"),
+    _R("motor.torque.rms", "N*m", "root mean square of the motor's torque over time, by which it warms", generation=1),
+    _R("motor.power.rms", "W", "root mean square of the motor's power over time", generation=1),
+    _R("motor.torque.margin", "1", "thermal margin: rated torque of the motor / rms of its torque", generation=1),
 )  # fmt: skip
 
 

@@ -43,11 +43,16 @@ _KINKS_FIRST, _MOST_CUTS = 3, 10
 BLOCK, _BLOCK_CYCLE = 64, 12
 
 _NAMES = tuple(info.name for info in result_infos())
-_OF_TIME = np.array([_NAMES.index("omega.mean_time"), _NAMES.index("irregularity.time")])
+_OF_TIME = np.array([
+    _NAMES.index(name)
+    for name in (
+        "omega.mean_time", "irregularity.time", "motor.torque.rms", "motor.power.rms", "motor.torque.margin"
+    )
+])  # fmt: skip
 #: Prefixes of results that a case without motion does not have.
 _OF_MOTION = (
     "omega.", "omega_squared.", "irregularity", "acceleration.", "s1.", "s2.", "s3.share", "s4.share", "power.",
-    "energy.m", "motor.s", "motor.p", "flywheel.s", "flywheel.margin",
+    "energy.m", "motor.s", "motor.p", "motor.torque.rms", "motor.torque.margin", "flywheel.s", "flywheel.margin",
 )  # fmt: skip
 #: The same for a motor that has no steady torque.
 _OF_MOTOR = (
@@ -207,6 +212,8 @@ def _attempt(machine: Machine, cuts: Floats) -> Solved:
     results["inertia.min"] = np.where(negative, least_inertia, results["inertia.min"])
     _by_definition(spec, d, results)
     results |= machine.train.results(panels, d.drive.torque, results)
+    rated = columns.row("drive.motor.rated_torque") if spec.balance == "motor" else np.inf
+    results |= machine.train.heating(panels, d.drive.torque, np.sqrt(d.squares), np.asarray(rated))
     fixed = spec.balance != "motor" and moved.omega is None
     results["required_inertia"] = _required(spec, columns, d, endings, fixed=fixed)
     results |= flywheel_results(machine.train.flywheel, columns, results, fixed=fixed)

@@ -19,6 +19,8 @@ class ShaftDriveMotor(TypedDict, total=False):
     no_load_speed : Speed at which its torque is 0 (w_0), rad/s; > 0 rad/s and <= 1e+06 rad/s.
     stall_torque : Its torque at rest (M_0), N*m; > 0 N*m and <= 1e+12 N*m.
     inertia : Inertia of its rotor (J_m), kg*m^2; >= 0 kg*m^2 and <= 1e+12 kg*m^2.
+    rated_torque : Torque that it gives continuously (duty type S1), which determines its thermal margin (M_N), N*m; > 0
+        N*m and <= 1e+12 N*m.
     synchronous_speed : Its synchronous speed (w_s), rad/s; > 0 rad/s and <= 1e+06 rad/s.
     breakdown_torque : Its largest torque (M_k), N*m; > 0 N*m and <= 1e+12 N*m.
     breakdown_slip : Slip at its largest torque (s_k); > 0 and <= 1000.
@@ -32,6 +34,7 @@ class ShaftDriveMotor(TypedDict, total=False):
     no_load_speed: Quantity
     stall_torque: Quantity
     inertia: Quantity
+    rated_torque: Quantity
     synchronous_speed: Quantity
     breakdown_torque: Quantity
     breakdown_slip: Quantity
@@ -99,7 +102,7 @@ class ShaftDrive(TypedDict, total=False):
         1e+12 kg*m^2.
     torque : Driving torque; at the motor where there are stages (M_d), N*m; >= -1e+30 N*m and <= 1e+30 N*m.
     scale : Factor on the driving torque (k_d); >= -1e+30 and <= 1e+30.
-    motor : A motor whose torque depends on its speed; fields kind, no_load_speed, stall_torque, inertia,
+    motor : A motor whose torque depends on its speed; fields kind, no_load_speed, stall_torque, inertia, rated_torque,
         synchronous_speed, breakdown_torque, breakdown_slip, scale, table, csv, interpolation; needed: kind.
     stages : Stages between motor and main shaft, motor first; fields kind, ratio, efficiency, output_inertia, inertia,
         mass, radius, lead; needed: kind.
@@ -550,6 +553,7 @@ class Shaft(Studies):
         "drive.motor.no_load_speed",
         "drive.motor.stall_torque",
         "drive.motor.inertia",
+        "drive.motor.rated_torque",
         "drive.motor.synchronous_speed",
         "drive.motor.breakdown_torque",
         "drive.motor.breakdown_slip",

@@ -9,14 +9,19 @@ from sprag_study.worker.models.form import Block, ComponentKind, Form, FormChoic
 
 _FORMULA_HELP: Final = "of phi in rad, such as 40*sin(2*phi)^2; of an operation also of t in s, x and omega"
 _TABLE_HELP: Final = "two columns, with units in their headings"
+#: What a motor of any kind may have.
+_OF_ANY_MOTOR: Final = ("inertia", "rated_torque")
 #: Motors and the numbers of each.
 MOTORS: Final = {
-    "linear": ("a motor with a linear characteristic", ("no_load_speed", "stall_torque", "inertia")),
-    "kloss": ("an induction motor (Kloss)", ("inertia", "synchronous_speed", "breakdown_torque", "breakdown_slip")),
-    "table": ("a motor with a measured characteristic", ("inertia", "scale")),
+    "linear": ("a motor with a linear characteristic", ("no_load_speed", "stall_torque", "inertia", "rated_torque")),
+    "kloss": (
+        "an induction motor (Kloss)",
+        ("inertia", "synchronous_speed", "breakdown_torque", "breakdown_slip", "rated_torque"),
+    ),
+    "table": ("a motor with a measured characteristic", ("inertia", "scale", "rated_torque")),
 }
 _COMPONENT_MOTORS: Final = {
-    kind: tuple(name for name in MOTORS[kind][1] if name != "inertia") for kind in ("kloss", "linear")
+    kind: tuple(name for name in MOTORS[kind][1] if name not in _OF_ANY_MOTOR) for kind in ("kloss", "linear")
 }
 _GEARED: Final = ("ratio", "efficiency", "output_inertia", "inertia")
 _STAGES: Final = {
@@ -208,7 +213,7 @@ FORM: Final = Form(
             "motor", "Motors",
             {"characteristic": "drive",
              **{name: f"drive/motor/{name}" for own in _COMPONENT_MOTORS.values() for name in own},
-             "inertia": "drive/motor/inertia"},
+             **{name: f"drive/motor/{name}" for name in _OF_ANY_MOTOR}},
             required=("characteristic",),
             twice="the motor is given twice", foreign="is not a field of this motor",
             change="Add or change a motor", keep="Keep the motor",
@@ -222,7 +227,7 @@ FORM: Final = Form(
     with_loads=True,
     front=(
         "mean_speed", "wanted_irregularity", "drive", r"drive\.(inertia|torque(\.\w+)?|flywheel)",
-        r"drive\.motor\.(?!inertia).*", r"drive\.flywheel\.(mass|diameter|width|thickness|shaft)",
+        r"drive\.motor\.(?!inertia|rated).*", r"drive\.flywheel\.(mass|diameter|width|thickness|shaft)",
         r"drive\.stages\.N\.(kind|ratio|lead|radius)", r"(parts\.N\.)?(mechanism|operation|crank_angle)",
         r"(parts\.N\.)?mechanism\.\w+\.(?!(kind|bodies|weights|rise|fall|inclination|.*_(centre|inertia|angle))$).*",
         r"(parts\.N\.)?mechanism\.(formula|csv|cam\.\w+_angle|linkage\.(elements|working))",

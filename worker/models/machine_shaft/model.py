@@ -248,7 +248,7 @@ class MachineShaft(Model):
 
     def presentation_of(self, study: Study) -> Presentation:
         """With the results of its flywheel and motor among the main ones."""
-        return presentation_of(study.structure or {})
+        return presentation_of(study.structure or {}, {*study.base, *study.column_paths})
 
     def parameters(self) -> tuple[Parameter, ...]:
         return catalogue()

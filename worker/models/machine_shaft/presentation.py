@@ -13,7 +13,7 @@ from sprag_study.worker.models.machine_shaft.words import CAPTIONS, LETTERS
 from sprag_study.worker.models.presentation import Answer, Clauses, Panel, Presentation, Reference
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
     from typing import Any
 
     from sprag_study.engine.outcome import Trajectory
@@ -123,13 +123,20 @@ PRESENTATION: Final = Presentation(
 )
 
 _OF_FLYWHEEL: Final = ("flywheel.inertia", "flywheel.stress", "flywheel.margin", "flywheel.required_mass")
-_OF_MOTOR: Final = ("motor.speed.mean", "motor.torque.mean", "motor.torque.max", "motor.power.mean")
+_OF_MOTOR: Final = (
+    "motor.speed.mean", "motor.torque.mean", "motor.torque.max", "motor.torque.rms", "motor.power.mean"
+)  # fmt: skip
 
 
-def presentation_of(structure: Mapping[str, Any]) -> Presentation:
-    """The presentation of machine shafts, with the main results of this one's flywheel and motor."""
+def presentation_of(structure: Mapping[str, Any], paths: Collection[str] = ()) -> Presentation:
+    """The presentation of machine shafts, with the main results of this one's flywheel and motor.
+
+    ``paths`` are those of its numbers.
+    """
     drive = structure.get("drive", {})
     more: tuple[str, ...] = _OF_FLYWHEEL if drive.get("flywheel") else ()
     if drive.get("motor") or drive.get("stages"):
         more += _OF_MOTOR
+    if "drive.motor.rated_torque" in paths:
+        more += ("motor.torque.margin",)
     return replace(PRESENTATION, main=PRESENTATION.main + more) if more else PRESENTATION
