@@ -35,6 +35,8 @@ _WIDER: Final = 1.5
 
 #: Frequency of the excitation, in Hz, below which it is slow.
 _SLOW: Final = 0.1
+#: By the kind of a motor the number that is, or multiplies, its largest torque.
+_LARGEST_TORQUE: Final = {"kloss": "breakdown_torque", "linear": "stall_torque", "table": "scale"}
 #: Parameters of the load of a vibration drive that mean nothing where another one is 0.
 _ONLY_WITH: Final = {"shaft.cyclic_load": "shaft.load", "shaft.stribeck_speed": "shaft.stribeck_load"}
 
@@ -141,6 +143,27 @@ def _shaft_relations(report: Report, study: Study) -> None:
                 _turned_step(report, study, f"{prefix}operation.steps.{k}.", wraps=operation["over"] == "angle")
     _chosen_angle(report, study)
     _short_tables(report, study)
+    _rating(report, study)
+
+
+def _rating(report: Report, study: Study) -> None:
+    """Warn of a rated torque that the motor gives at no speed."""
+    drive, path = (study.structure or {})["drive"], "drive.motor.rated_torque"
+    if path not in {*study.base, *study.column_paths}:
+        return
+    rated, most, weight = _columns(study, [path, f"drive.motor.{_LARGEST_TORQUE[drive['motor']]}"])
+    if drive["motor"] == "table":
+        most = most * max(torque for _, torque in drive["table"]["rows"])
+    rated, most = np.broadcast_arrays(rated, most)
+    above = rated > most
+    if above.any():
+        worst = int(np.argmax(np.where(above, rated / most, 0.0)))
+        text = Sentence(
+            "{rated} is more than the largest torque of this motor, {most}",
+            rated=Amount(float(rated.flat[worst]), "N*m", 6),
+            most=Amount(float(most.flat[worst]), "N*m", 6),
+        )
+        report.warn("implausible-value", _place(study, path), _with_share(text, above, weight))
 
 
 def _short_tables(report: Report, study: Study) -> None:
@@ -373,5 +396,5 @@ def _columns(study: Study, paths: Sequence[str]) -> list[NDArray[np.float64]]:
             ends = tuple(Axis(axis.paths, np.unique([axis.array.min(), axis.array.max()])) for axis in part.axes)
             part = replace(part, axes=ends)
     varied = part.columns(range(part.cases))
-    columns = [np.asarray(varied.get(path, study.base[path]), dtype=np.float64) for path in paths]
+    columns = [np.asarray(varied[path] if path in varied else study.base[path], dtype=np.float64) for path in paths]
     return [*columns, np.asarray(float(cases_each))]

@@ -143,6 +143,15 @@ def test_a_shaft_takes_a_motor(service: Service) -> None:
     assert motor["synchronous_speed"] == "1500 об/мин"
 
 
+def test_a_motor_has_a_rated_torque_where_it_is_known(service: Service) -> None:
+    rated = {**MOTOR, "fields": {**MOTOR["fields"], "rated_torque": "26 N*m"}}
+    values = empty("machine-shaft") | {"component": stored(service, rated)["1LE1 4 kW"]}
+    take_component(values, service.store.components.all())
+    assert spec_of(values)[0]["base"]["drive"]["motor"]["rated_torque"] == "26 N*m"
+    with pytest.raises(SpecError, match="/components/0/fields/rated_torque"):
+        read_components({"components": [{**MOTOR, "fields": {**MOTOR["fields"], "rated_torque": "0 N*m"}}]})
+
+
 def test_the_form_offers_them_and_undoes_taking_them(service: Service) -> None:
     assert 'value="take-component"' not in service.http.get("/new").text
     spring = stored(service, *ALL)["F-120"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import jsonschema
@@ -9,8 +10,10 @@ import pytest
 
 from sprag_study.service.spec.document import parse_spec
 from sprag_study.service.spec.machine.registry import part_of
+from sprag_study.service.spec.report import SpecError
 from sprag_study.service.spec.schema.document import spec_schema
-from tests.service.spec.machine.test_shaft import changed, problems
+from sprag_study.worker import models
+from tests.service.spec.machine.test_shaft import KLOSS, LINEAR, changed, problems
 
 STAGES: list[dict[str, Any]] = [
     {"kind": "belt", "ratio": 3, "inertia": "50 kg*cm^2", "mass": "2 kg", "radius": "60 mm", "efficiency": 0.95},
@@ -145,3 +148,68 @@ def test_the_side_that_is_balanced() -> None:
     assert problems(both)["/base/operation"].code == "required"
     wrong = given | {"/base/operation/steps/0/value": "-20 kN"}
     assert "the operation drives instead of resisting" in problems(wrong)["/base/balance"].message
+
+
+def motor_spec(motor: dict[str, Any], **fields: Any) -> dict[str, Any]:
+    """A torque of 40 N*m against a motor."""
+    load = {"quantity": "torque", "value": "40 N*m"}
+    base = {"drive": {"inertia": 8.0, "motor": motor}, "operation": load}
+    return {"sprag": 1, "model": "machine-shaft", "name": "hoist", "base": base, **fields}
+
+
+def test_a_rated_torque_gives_the_motor_a_thermal_margin() -> None:
+    plain, rated = (parse_spec(motor_spec(KLOSS | own)).study for own in ({}, {"rated_torque": "100 N*m"}))
+    assert dict(rated.base) == dict(plain.base) | {"drive.motor.rated_torque": 100.0}
+    shown = [models.presentation_of(study).main for study in (plain, rated)]
+    assert ["motor.torque.margin" in main for main in shown] == [False, True]
+    assert all("motor.torque.rms" in main for main in shown)
+    names = [info.name for info in models.study_results(rated)]
+    row = dict(zip(names, models.run_chunk(rated, 0, 1).values[0].tolist(), strict=True))
+    assert row["motor.torque.rms"] == pytest.approx(40.0, rel=1e-9)
+    assert row["motor.torque.margin"] == pytest.approx(2.5, rel=1e-9)
+    before = dict(zip(names, models.run_chunk(plain, 0, 1).values[0].tolist(), strict=True))
+    assert [name for name in names if not (before[name] == row[name] or math.isnan(row[name]))] == [
+        "motor.torque.margin"
+    ]
+
+
+def test_the_margin_is_a_limit_a_quantity_and_a_refined_result() -> None:
+    goal = {
+        "vary": [{"path": "drive.motor.rated_torque", "from": "10 N*m", "to": "90 N*m"}],
+        "best": [{"result": "motor.torque.rms"}], "subject_to": [{"result": "motor.torque.margin", "at_least": 1.1}],
+    }  # fmt: skip
+    plan = parse_spec(motor_spec(KLOSS, goal=goal)).study.plan
+    assert plan is not None
+    assert plan["subject_to"][0]["result"] == "motor.torque.margin"
+    axis = {"path": "drive.motor.rated_torque", "linspace": ["20 N*m", "90 N*m", 3]}
+    reserve = {"formula": "drive.motor.rated_torque - motor.torque.rms", "unit": "N*m"}
+    study = parse_spec(motor_spec(KLOSS, axes=[axis], quantities={"reserve": reserve})).study
+    assert "motor.torque.margin" in models.presentation_of(study).main
+    names = [info.name for info in models.study_results(study)]
+    assert "reserve" in names
+    margins = models.run_chunk(study, 0, 3).values[:, names.index("motor.torque.margin")]
+    assert margins == pytest.approx([0.5, 1.375, 2.25])
+    load = {"path": "operation.scale", "adaptive": [0.5, 2]}
+    refined = motor_spec(KLOSS | {"rated_torque": 60}, axes=[load], refine={"results": ["motor.torque.margin"]})
+    refined_plan = parse_spec(refined).study.plan
+    assert refined_plan is not None
+    assert "motor.torque.margin" in str(refined_plan["results"])
+
+
+def test_a_rated_torque_that_the_motor_never_gives_is_warned_of() -> None:
+    table = {"kind": "table", "csv": "speed [rpm],torque [N*m]\n0,60\n140,50\n150,0\n"}
+    for motor, most in ((KLOSS, "900"), (LINEAR, "3000"), (table, "60")):
+        (warning,) = parse_spec(motor_spec(motor | {"rated_torque": "3.2 kN*m"})).warnings
+        assert warning.code == "implausible-value"
+        said = f"3200 N*m is more than the largest torque of this motor, {most} N*m"
+        assert warning == f"/base/drive/motor/rated_torque: {said}"
+    axis = {"path": "drive.motor.rated_torque", "values": ["20 N*m", "1000 N*m"]}
+    (warning,) = parse_spec(motor_spec(KLOSS, axes=[axis])).warnings
+    assert warning.startswith("/axes/0 (drive.motor.rated_torque): 1000 N*m is more than the largest torque")
+    assert warning.endswith("900 N*m (in 1 of 2 cases)")
+
+
+def test_a_rated_torque_belongs_to_a_motor() -> None:
+    assert problems({"/base/drive/rated_torque": 5})["/base/drive/rated_torque"].code == "unknown-field"
+    with pytest.raises(SpecError, match="/base/drive/motor/rated_torque: is out of range"):
+        parse_spec(motor_spec(KLOSS | {"rated_torque": 0}))
