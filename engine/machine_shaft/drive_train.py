@@ -98,7 +98,7 @@ class Train:
 
         The copper losses follow the square of the current, and that follows the torque: the constant torque that warms
         the motor as much is the square root of the mean of M^2 over time, with dt = dphi/omega (G. K. Dubey,
-        *Fundamentals of Electrical Drives*, chapter 4; docs/theory-machine-shaft.md, "The motor's rating").
+        *Fundamentals of Electrical Drives*, chapter 4; docs/theory-machine-shaft.md, "Rating of the motor").
 
         Parameters
         ----------

@@ -74,6 +74,7 @@ _THEORY: Final = {
     "drive.torque": "balance-of-works",
     "drive.scale": "balance-of-works",
     "drive.motor": "balance-of-works",
+    "drive.motor.rated_torque": "rating-of-the-motor",
     "drive.flywheel": "flywheels",
     "mechanism": "mechanisms",
     "parts": "several-parts",
