@@ -97,6 +97,7 @@ KIND_MEANINGS: Final[dict[Kind, str]] = {
 
 #: Of warnings.
 WARNING_MEANINGS: Final[dict[WarningCode, str]] = {
+    "added-vibration": "The base has a measured motion and an amplitude, which is added to it.",
     "ambiguous-point": "Points are read as decimal points, though each of them could separate thousands.",
     "angular-frequency": "A formula gives a frequency by a root without a factor pi, which is an angular frequency.",
     "assumed-units": "The file of measured data does not name every unit.",
@@ -121,6 +122,10 @@ WARNING_MEANINGS: Final[dict[WarningCode, str]] = {
     "not-monotonic": "The values of a list neither rise nor fall throughout.",
     "nothing-acts": "The machine, or one of its parts, has neither a mechanism nor an operation.",
     "nothing-moves": "Both amplitudes of the base are 0.",
+    "reduced-motion": (
+        "Harmonics stand for the measured motion of the base. The warning says what they leave of it, in percent of "
+        "its amplitude."
+    ),
     "replaced-value": "The value is replaced, as another field requires.",
     "rows-in-backlash": "Some measured rows lie within the backlash and were left out of the fit.",
     "several-speeds": "The shaft may turn steadily at more speeds than the one that the results are about.",

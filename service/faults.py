@@ -73,6 +73,7 @@ Code = Literal[
 
 #: Codes of warnings: what is allowed but probably unintended.
 WarningCode = Literal[
+    "added-vibration",
     "ambiguous-point",
     "angular-frequency",
     "assumed-units",
@@ -95,6 +96,7 @@ WarningCode = Literal[
     "nothing-acts",
     "not-monotonic",
     "nothing-moves",
+    "reduced-motion",
     "replaced-value",
     "rows-in-backlash",
     "several-speeds",

@@ -120,6 +120,8 @@ def _origin(spec: Mapping[str, Any], path: str) -> Origin:
     place: Any = spec.get("base")
     if not isinstance(place, Mapping):
         return ""
+    if path.startswith(HARMONICS) and "measured" in place["excitation"]:
+        return "fitted"
     if path.startswith((LOAD_TABLE, HARMONICS)):
         return "given"
     for key in path.split("."):

@@ -37,6 +37,7 @@ from sprag_study.engine.vibration_drive.clutch import (
     fit_clutch,
 )
 from sprag_study.engine.vibration_drive.clutch import torque as clutch_torque
+from sprag_study.engine.vibration_drive.measured_base import Reduction, reduce_motion, resolved_order
 from sprag_study.engine.vibration_drive.parameters import (
     CLUTCH_COEFFICIENT,
     CLUTCH_WINDUP_LIMIT,
@@ -158,6 +159,7 @@ __all__ = [
     "Presentation",
     "Quantities",
     "Quantity",
+    "Reduction",
     "Reference",
     "ResultInfo",
     "Run",
@@ -202,8 +204,10 @@ __all__ = [
     "prepare",
     "presentation_of",
     "printed_symbol",
+    "reduce_motion",
     "regime_info",
     "register",
+    "resolved_order",
     "result_catalogue",
     "result_infos",
     "run_basin",

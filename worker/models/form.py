@@ -34,7 +34,8 @@ class FormField:
     ----------
     label, help, range, default, example, symbol, unit, required : of what no catalogue describes, or instead of its
     lines : height of its text; 0 for a line
-    columns : of a table, or the choice (with ``@``) whose value is the column
+    columns : of a table, or the choice (with ``@``) whose value is the column; of several quantities (``angle|time``)
+        the one that a column has
     without : values of its choices that are not offered
     hidden : where it is not there
     """

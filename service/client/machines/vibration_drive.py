@@ -24,6 +24,22 @@ class DriveExcitationHarmonics(TypedDict, total=False):
     csv: str
 
 
+class DriveExcitationMeasured(TypedDict, total=False):
+    """One period of the measured motion of the base, which is reduced to harmonics.
+
+    table : Rows of angle (rad), x and y (m); or of time (s), of accelerations (m/s^2), as texts with their units.
+    csv : Angle or time, and x, y or both, as displacements or accelerations, as the text of a CSV file, headings with
+        units in brackets.
+    period : Period of the measured motion, of rows with times or accelerations, s; > 0 s and <= 1e+06 s.
+    accuracy : Rms residual at which the reduction to harmonics ends, as a share of the amplitude; > 0 and <= 1.
+    """
+
+    table: Sequence[Sequence[Quantity]]
+    csv: str
+    period: Quantity
+    accuracy: Quantity
+
+
 class DriveExcitation(TypedDict, total=False):
     """Fields of excitation.
 
@@ -34,6 +50,8 @@ class DriveExcitation(TypedDict, total=False):
     harmonic_factor : Factor of the amplitudes of all harmonics of the base (k_h); >= 0 and <= 1e+06.
     harmonics : Harmonics beside the vibration: d_K cos(m_K nu t + alpha_K) along x, b_K sin(m_K nu t + beta_K) along y;
         fields table, csv.
+    measured : One period of the measured motion of the base, which is reduced to harmonics; fields table, csv, period,
+        accuracy.
     """
 
     frequency: Quantity
@@ -42,6 +60,7 @@ class DriveExcitation(TypedDict, total=False):
     phase: Quantity
     harmonic_factor: Quantity
     harmonics: DriveExcitationHarmonics
+    measured: DriveExcitationMeasured
 
 
 class DrivePendulum(TypedDict, total=False):
@@ -204,6 +223,8 @@ class Drive(Studies):
         "excitation.amplitude_y",
         "excitation.phase",
         "excitation.harmonic_factor",
+        "excitation.measured.period",
+        "excitation.measured.accuracy",
         "pendulums.*.inertia",
         "pendulums.*.mass",
         "pendulums.*.arm",
@@ -261,7 +282,7 @@ class Drive(Studies):
         Parameters
         ----------
         excitation : values
-            Fields frequency, amplitude_x, amplitude_y, phase, harmonic_factor, harmonics; needed: frequency.
+            Fields frequency, amplitude_x, amplitude_y, phase, harmonic_factor, harmonics, measured; needed: frequency.
         pendulums : values
             Fields inertia, mass, arm, spring_rate, spring_arm, damping, backlash, clutch_damping, overrunning_damping,
             rated_torque, rated_frequency, rated_speed, fatigue_exponent, initial_angle, initial_speed, initial_windup,

@@ -13,6 +13,7 @@ from sprag_study.service.reading.texts import did_you_mean
 from sprag_study.service.spec.described import Field, Listed, Record
 from sprag_study.service.spec.machine.clutch import CLUTCH, Clutch, read_clutch
 from sprag_study.service.spec.machine.machine import Machine
+from sprag_study.service.spec.machine.measured_base import MEASURED_BASE, read_measured_base
 from sprag_study.service.spec.machine.shaft_tables import read_csv_rows
 from sprag_study.service.spec.node import Node
 from sprag_study.service.spec.schema.quantity import QUANTITY, required_of
@@ -37,6 +38,8 @@ from sprag_study.worker.models.parameters import placed
 from sprag_study.worker.models.vocabulary import ordinal
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from sprag_study.worker.models import ClutchFit
 
 #: Field of the base that a service replaces by the initial values that go on from the end of a case.
@@ -46,6 +49,7 @@ _SHAFT: Final = "shaft"
 _LOAD_FIELD: Final = "load_table"
 _EXCITATION: Final = "excitation"
 _HARMONICS_FIELD: Final = "harmonics"
+_MEASURED_FIELD: Final = "measured"
 #: A start from the end of a case of a study of the same service.
 START_AT: Final = Record(
     {
@@ -109,7 +113,10 @@ def drive_record() -> Record:
     fields: dict[str, Field] = {}
     required: list[str] = []
     catalogue = _catalogue()
-    tables: dict[str, dict[str, Field]] = {_SHAFT: {_LOAD_FIELD: LOAD}, _EXCITATION: {_HARMONICS_FIELD: OVERTONES}}
+    tables: dict[str, dict[str, Field]] = {
+        _SHAFT: {_LOAD_FIELD: LOAD},
+        _EXCITATION: {_HARMONICS_FIELD: OVERTONES, _MEASURED_FIELD: MEASURED_BASE},
+    }
     for name in dict.fromkeys(entry.path.split(".")[0] for entry in catalogue):
         entries = {entry.path.split(".")[-1]: entry for entry in catalogue if entry.path.split(".")[0] == name}
         needed = required_of(entries)
@@ -202,6 +209,7 @@ def read_drive(base: Node) -> Drive:
                 _read_load(base[name][_LOAD_FIELD], machine)
             if name == _EXCITATION:
                 _read_harmonics(base[name][_HARMONICS_FIELD], machine)
+                _read_measured(base[name], machine)
         elif isinstance(section, Parameter):
             number = base[name].otherwise(section.default).number(section)
             machine.values.update({} if number is None else {name: number})
@@ -275,8 +283,33 @@ def _read_harmonics(node: Node, machine: Drive) -> None:
             message = Sentence("must have whole orders, each once: row {row} does not", row=k + 1)
             own.refuse("invalid-table", message, f"{order:g}", allowed=HARMONIC_PARAMETERS[0].help)
             return
+    _take_harmonics(machine, rows)
+
+
+def _take_harmonics(machine: Drive, rows: Iterable[Iterable[float]]) -> None:
+    """Give a machine rows of harmonics in the order of `HARMONIC_PARAMETERS`."""
     for k, row in enumerate(rows):
-        machine.values.update({f"{HARMONICS}{k}.{entry.path}": v for entry, v in zip(named, row, strict=True)})
+        values = zip(HARMONIC_PARAMETERS, row, strict=True)
+        machine.values.update({f"{HARMONICS}{k}.{entry.path.rpartition('.')[2]}": value for entry, value in values})
+
+
+def _read_measured(excitation: Node, machine: Drive) -> None:
+    """Read the measured motion of the base, and place the harmonics that stand for it under ``HARMONICS``."""
+    node = excitation[_MEASURED_FIELD]
+    if not node.given:
+        return
+    if excitation[_HARMONICS_FIELD].given:
+        node.refuse(
+            "conflict", "is given beside harmonics", None, allowed=N_("either harmonics or one measured period")
+        )
+        return
+    rows = read_measured_base(node)
+    _take_harmonics(machine, rows)
+    amplitudes = [f"amplitude_{axis}" for axis in "xy"]
+    added = [name for name in amplitudes if machine.values.get(f"{_EXCITATION}.{name}")]
+    if rows and added:
+        text = Sentence("{names} is added to the measured motion", names=", ".join(added))
+        node.report.warn("added-vibration", node.pointer, text)
 
 
 def _read_pendulums(node: Node, listed: Listed, machine: Drive) -> None:

@@ -46,7 +46,7 @@ def read_csv_rows(node: Node, *columns: Parameter) -> list[list[float]]:
             allowed=example,
         )
         return []
-    units = [_unit_of(*(heading or ("", "")), column) for heading, column in zip(headings, columns, strict=True)]
+    units = [unit_of_heading(*(heading or ("", "")), column) for heading, column in zip(headings, columns, strict=True)]
     before = node.report.found
     for unit, column in zip(units, columns, strict=True):
         if column.unit == "1":
@@ -78,7 +78,7 @@ def read_csv_rows(node: Node, *columns: Parameter) -> list[list[float]]:
     return found
 
 
-def _unit_of(name: str, unit: str, column: Parameter) -> str:
+def unit_of_heading(name: str, unit: str, column: Parameter) -> str:
     """The unit of a heading: that in brackets, or else its last word where this is a unit of the column."""
     word = _LAST_WORD.search(name)
     if unit or word is None:

@@ -73,9 +73,36 @@ _HARMONICS: Final = FormField(
     columns=("order", "amplitude_x", "phase_x", "amplitude_y", "phase_y"),
 )  # fmt: skip
 
+#: What the base does beside the vibration of one frequency.
+_FURTHER: Final = FormChoice(
+    "excitation/further", "Further motion of the base", control="switch",
+    options=(
+        Option("harmonics", "Harmonics", (_HARMONICS,)),
+        Option("measured", "One measured period", (
+            FormField(
+                "excitation/measured/csv", "table", "Measured motion",
+                "angle or time, then x, y or both, as displacements or accelerations, pasted from a spreadsheet with "
+                "headings and units; rows over one period, which are reduced to harmonics; leave the amplitudes above "
+                "empty, as they are added",
+                example="angle [deg],x [mm],y [mm]\n0,0.5,0\n5,0.49,0.02", required=True, lines=7,
+                columns=("angle|time", "displacement_x|acceleration_x", "displacement_y|acceleration_y"),
+            ),
+            FormField(
+                "excitation/measured/period", "number", "Period of the measurement",
+                "of rows with times or accelerations only", range="> 0 s", example="40 ms", unit="s",
+            ),
+            FormField(
+                "excitation/measured/accuracy", "number", "Accuracy of the reduction",
+                "rms residual at which the reduction to harmonics ends, as a share of the amplitude",
+                range="> 0 and <= 1", default="1 %", example="1 %", unit="1",
+            ),
+        ), at="excitation/measured/csv"),
+    ),
+)  # fmt: skip
+
 FORM: Final = Form(
     parts=(
-        Block("Vibration of the base", (FormField("excitation/*"), _HARMONICS)),
+        Block("Vibration of the base", (FormField("excitation/*"), _FURTHER)),
         Rows(
             "pendulums", "pendulums", 1, MAX_PENDULUMS, "Pendulum {number}", "Add a pendulum", "Remove the last one",
             blocks=(

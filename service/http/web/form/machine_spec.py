@@ -25,7 +25,7 @@ from sprag_study.service.reading.numbers import parse_number
 from sprag_study.service.reading.part_names import lower_first
 from sprag_study.service.reading.printed import could_be_several
 from sprag_study.service.reading.together import with_last_unit
-from sprag_study.service.reading.units import parse_quantity, split_typed
+from sprag_study.service.reading.units import QuantityError, parse_quantity, split_typed
 from sprag_study.service.reading.wording import unit_text
 from sprag_study.service.spec.derive import formulas_of, with_values
 from sprag_study.service.spec.fields import base_path, base_pointer
@@ -41,7 +41,11 @@ _STEP: Final = (N_("from"), N_("to"), N_("value"))
 _COLUMNS: Final = {
     "angle": ("angle", "rad"), "stroke": ("fraction", "1"), "time": ("time", "s"), "speed": ("speed", "rad/s"),
     "force": ("force", "N"), "torque": ("torque", "N*m"), "inertia": ("inertia", "kg*m^2"),
-    "pressure": ("pressure", "Pa"),
+    "pressure": ("pressure", "Pa"), "order": ("order", "1"),
+    **{f"amplitude_{axis}": (f"amplitude {axis}", "m") for axis in "xy"},
+    **{f"phase_{axis}": (f"phase {axis}", "rad") for axis in "xy"},
+    **{f"displacement_{axis}": (axis, "m") for axis in "xy"},
+    **{f"acceleration_{axis}": (axis, "m/s^2") for axis in "xy"},
 }  # fmt: skip
 
 
@@ -304,9 +308,21 @@ def _table(names: Sequence[str], rows: Sequence[Sequence[Any]], separator: str) 
 
 
 def _column(name: str, cells: Sequence[Any], separator: str) -> list[str]:
-    """Heading and numbers of a column of quantities; raises QuantityError."""
-    heading, si = _COLUMNS[name]
-    numbers = [parse_quantity(cell, si) for cell in cells]
+    """Heading and numbers of a column of quantities, of the first of several names (``angle|time``) that fits them.
+
+    Raises
+    ------
+    QuantityError
+        If none fits.
+    """
+    first, _, further = name.partition("|")
+    heading, si = _COLUMNS[first]
+    try:
+        numbers = [parse_quantity(cell, si) for cell in cells]
+    except QuantityError:
+        if further:
+            return _column(further, cells, separator)
+        raise
     units = {split_typed(cell)[1] if isinstance(cell, str) else "" for cell in cells}
     if si != "1" and len(units) == 1 and (unit := units.pop()):
         typed = [cell.strip().removesuffix(unit).strip() for cell in cells]
