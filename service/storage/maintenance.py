@@ -23,7 +23,7 @@ from sprag_study.service.storage.people.audit import note
 from sprag_study.service.storage.rows.digests import Digests
 from sprag_study.service.storage.rows.order import Orders
 from sprag_study.service.storage.studies.records import CheckReport
-from sprag_study.service.storage.tables import HEAD_REVISION, all_tables
+from sprag_study.service.storage.tables import HEAD_REVISION, all_tables, make_tables_of_file
 
 if TYPE_CHECKING:
     from sprag_study.service.storage.database.session import Session
@@ -103,7 +103,10 @@ def make(session: Session, found: str = HEAD_REVISION) -> None:
     """Make the tables of an empty database, with ``found`` as its revision, in one transaction."""
     with session.write() as connection:
         if not sa.inspect(connection).get_table_names():  # no other process was faster
-            all_tables().create_all(connection, checkfirst=False)
+            if session.on_server:
+                all_tables().create_all(connection, checkfirst=False)
+            else:
+                make_tables_of_file(connection)
             _VERSION.create(connection)
             connection.execute(_VERSION.insert().values(version_num=found))
 

@@ -1,6 +1,8 @@
 """The tables. Times are microseconds since 1970-01-01 UTC; JSON is text, stored exactly as it was given."""
 
 import threading
+from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cache
 from typing import Final
 
@@ -250,11 +252,7 @@ def results_name(model: str, variant: str) -> str:
 @cache
 def results_table(model: str, variant: str) -> sa.Table:
     """The table with the results of that variant of ``model``: a row for each finished case."""
-    name, infos = results_name(model, variant), models.result_infos(model, models.table_of(model, variant))
-    # Cases are counted and selected by their categories.
-    categories = [info.column for info in infos if info.kind == "category"]
-    indexes = (sa.Index(f"ix_{name}_{column}", "study", column, "case_number") for column in categories)
-    return _table_of_rows(name, infos, *indexes)
+    return _results(model, variant).table()
 
 
 @cache
@@ -263,34 +261,101 @@ def further_table(model: str, variant: str) -> sa.Table | None:
 
     Its columns are those of `results_table`, which has the row with the number 0.
     """
+    further = _further(model, variant)
+    return None if further is None else further.table()
+
+
+@dataclass(frozen=True, slots=True)
+class _Rows:
+    """A table of rows.
+
+    ``infos`` are its results. ``indexed`` are columns by which cases are counted and selected. ``number`` is the result
+    that belongs to its key, None where the case alone is the key.
+    """
+
+    name: str
+    infos: tuple[models.ResultInfo, ...]
+    indexed: tuple[str, ...] = ()
+    number: str | None = None
+
+    def table(self) -> sa.Table:
+        """Its description, which each process makes once."""
+        with _DEFINING:
+            if self.name in METADATA.tables:
+                return METADATA.tables[self.name]
+            results = (
+                sa.Column(
+                    info.column, sa.Double if info.kind == "real" else sa.Integer, primary_key=info.name == self.number
+                )
+                for info in self.infos
+            )
+            indexes = (sa.Index(self._index(column), "study", column, "case_number") for column in self.indexed)
+            return sa.Table(
+                self.name,
+                METADATA,
+                sa.Column("study", sa.Integer, sa.ForeignKey("studies.number"), primary_key=True),
+                sa.Column("case_number", sa.Integer, primary_key=True),
+                sa.Column("ending", sa.String(40), nullable=False),
+                sa.Column("flags", sa.Text, nullable=False),
+                *results,
+                *indexes,
+                sqlite_with_rowid=False,
+            )
+
+    def _index(self, column: str) -> str:
+        return f"ix_{self.name}_{column}"
+
+    def statements(self) -> Iterator[str]:
+        """The statements that make it in an SQLite file, as SQLAlchemy writes them of `table`."""
+        key = ["study", "case_number", *(info.column for info in self.infos if info.name == self.number)]
+        columns = [
+            "study INTEGER NOT NULL",
+            "case_number INTEGER NOT NULL",
+            "ending VARCHAR(40) NOT NULL",
+            "flags TEXT NOT NULL",
+            *(
+                f"{info.column} {'DOUBLE' if info.kind == 'real' else 'INTEGER'}{' NOT NULL' * (info.column in key)}"
+                for info in self.infos
+            ),
+            f"CONSTRAINT pk_{self.name} PRIMARY KEY ({', '.join(key)})",
+            f"CONSTRAINT fk_{self.name}_study FOREIGN KEY(study) REFERENCES studies (number)",
+        ]
+        written = ", \n\t".join(columns)
+        yield f"CREATE TABLE {self.name} (\n\t{written}\n)\n WITHOUT ROWID\n\n"
+        for column in self.indexed:
+            yield f"CREATE INDEX {self._index(column)} ON {self.name} (study, {column}, case_number)"
+
+
+def _results(model: str, variant: str) -> _Rows:
+    infos = models.result_infos(model, models.table_of(model, variant))
+    categories = tuple(info.column for info in infos if info.kind == "category")
+    return _Rows(results_name(model, variant), infos, categories)
+
+
+def _further(model: str, variant: str) -> _Rows | None:
     numbered = models.numbered_by(model, variant)
     if numbered is None:
         return None
-    return _table_of_rows(f"{results_name(model, variant)}_more", models.result_infos(model, variant), number=numbered)
+    return _Rows(f"{results_name(model, variant)}_more", models.result_infos(model, variant), number=numbered)
 
 
-def _table_of_rows(
-    name: str, infos: tuple[models.ResultInfo, ...], *indexes: sa.Index, number: str | None = None
-) -> sa.Table:
-    """A table of rows; the result ``number`` belongs to its key."""
-    with _DEFINING:
-        if name in METADATA.tables:
-            return METADATA.tables[name]
-        results = (
-            sa.Column(info.column, sa.Double if info.kind == "real" else sa.Integer, primary_key=info.name == number)
-            for info in infos
-        )
-        return sa.Table(
-            name,
-            METADATA,
-            sa.Column("study", sa.Integer, sa.ForeignKey("studies.number"), primary_key=True),
-            sa.Column("case_number", sa.Integer, primary_key=True),
-            sa.Column("ending", sa.String(40), nullable=False),
-            sa.Column("flags", sa.Text, nullable=False),
-            *results,
-            *indexes,
-            sqlite_with_rowid=False,
-        )
+def make_tables_of_file(connection: sa.Connection) -> None:
+    """Make all tables in an empty SQLite file.
+
+    `all_tables` describes thousands of columns of results, which takes most of a second, and a process needs few of
+    them: the tables of rows are made by their text.
+    """
+    rows: dict[str, _Rows] = {}
+    for model in models.model_names():
+        for variant in models.variants(model):
+            for each in (_results(model, variant), _further(model, variant)):
+                if each is not None:
+                    rows.setdefault(each.name, each)
+    others = [table for table in METADATA.sorted_tables if table.name not in rows]
+    METADATA.create_all(connection, others, checkfirst=False)
+    for each in rows.values():
+        for statement in each.statements():
+            connection.exec_driver_sql(statement)
 
 
 def tables_of_rows(model: str, variant: str) -> list[sa.Table]:

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from benchmarks.faults.harness import COMMAND, ROOT, environment, with_tables
+from benchmarks.faults import harness
+from benchmarks.faults.harness import COMMAND, ROOT, with_tables
 
 __all__ = [
     "COMMAND",
@@ -39,6 +40,11 @@ INTERRUPTIBLE = (
     "signal.signal(signal.SIGHUP, signal.SIG_DFL); "
     "from sprag_study.service.cli import main; main()",
 )
+
+
+def environment(**more: str) -> dict[str, str]:
+    """That of the drills, with one process for cases: each further one loads the engine first."""
+    return harness.environment(**{"SPRAG_PROCESSES": "1", **more})
 
 
 @dataclass(frozen=True)

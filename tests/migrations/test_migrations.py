@@ -24,7 +24,7 @@ from sprag_study.service.storage.database.session import Session
 from sprag_study.service.storage.database.sqlite_files import sqlite_driver
 from sprag_study.service.storage.errors import DatabaseError, SchemaError
 from sprag_study.service.storage.store import Store
-from sprag_study.service.storage.tables import HEAD_REVISION
+from sprag_study.service.storage.tables import HEAD_REVISION, all_tables
 from sprag_study.worker import models
 from sprag_study.worker.states import StudyState
 from tests import postgres, statements
@@ -381,6 +381,18 @@ def test_an_empty_database_is_made_ready_by_opening_it(url: str, file: Path) -> 
     connection = sqlite_driver().connect(file)
     assert connection.execute("PRAGMA journal_mode").fetchone() == ("wal",)
     connection.close()
+
+
+def test_a_new_file_has_the_tables_that_are_described(url: str, file: Path, tmp_path: Path) -> None:
+    """Those of rows are made by texts of their own, which are those of SQLAlchemy."""
+    made = "SELECT name, sql FROM sqlite_master WHERE name <> 'alembic_version'"
+    described = tmp_path / "described.sqlite3"
+    with Session(f"sqlite:///{described}").write() as connection:
+        all_tables().create_all(connection, checkfirst=False)
+    Store.open(url).close()
+    new = [row for row in rows_of(file, made) if "alembic_version" not in str(row[0])]
+    assert sorted(new, key=str) == sorted(rows_of(described, made), key=str)
+    assert len(new) > 100
 
 
 def test_two_that_open_a_new_database_at_once_both_get_it(url: str) -> None:

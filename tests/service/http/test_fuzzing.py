@@ -28,18 +28,22 @@ HEAVY = {
         ("create_study", "preview_study", "extend_study", "create_schedule", "change_schedule"), ("coverage",)
     ),
     "get_report": ("examples", "coverage"),
-    # Their questions are read by the code that reads those of `get_diagram`, `get_curves` and `get_map`.
+    # Their questions are read by the code that reads those of `get_curves`; `get_audit` is asked about times as
+    # `list_studies` is.
     **dict.fromkeys(
         (
             *("get_transient", "get_forces", "get_basin", "get_trajectory", "get_section", "get_branch", "get_strobes"),
             *("get_duty", "get_engagements", "get_yield", "get_exploration", "get_ribbon", "get_answers", "get_front"),
-            *("get_map", "get_sensitivity", "get_calibration", "get_speeds"),
+            *("get_map", "get_sensitivity", "get_calibration", "get_speeds", "get_diagram", "get_audit"),
         ),
         ("coverage",),
     ),
-    # Of bodies those of `change_study`, `create_token`, `put_components` and `save_view` stand for the others.
+    # Of bodies those of `create_token`, `put_components`, `save_view` and `change_view` stand for the others.
     **dict.fromkeys(
-        ("fit_clutch", "select_cases", "narrow_study", "run_longer", "add_user", "change_user", "hand_over_user"),
+        (
+            *("fit_clutch", "select_cases", "narrow_study", "run_longer", "add_user", "change_user", "hand_over_user"),
+            "change_study",
+        ),
         ("coverage",),
     ),
 }
