@@ -17,7 +17,7 @@ _KEPT: Final[Mapping[str, frozenset[str]]] = {
     ),
     "indicator": frozenset({"over", "interpolation", "piston_area", "back_pressure", "recorded_at"}),
     "torque": frozenset({"interpolation"}),
-    "motor": frozenset({"interpolation", "inertia", "scale"}),
+    "motor": frozenset({"interpolation", "inertia", "rated_torque", "scale"}),
 }
 _ALLOWED = N_("PLACE=FILE, such as operation=torque.csv, drive.motor=motor.csv or parts.0.operation.indicator=p.csv")
 
