@@ -10,10 +10,11 @@ from sprag_study.service.answers import Doc, Number
 
 
 class CalibratedParameter(TypedDict):
-    """An unknown parameter."""
+    """An unknown parameter, or the gain or the offset of a sensor."""
 
-    name: Annotated[str, Doc("the first of `paths`")]
-    paths: Annotated[list[str], Doc("the parameters that take the value together")]
+    name: Annotated[str, Doc("the first of `paths`, or that of the result with `.gain` or `.offset`")]
+    paths: Annotated[list[str], Doc("the parameters that take the value together; none for gain or offset")]
+    sensor: Annotated[str | None, Doc("the measured result whose gain or offset it is; null for a parameter")]
     unit: str
     low: Annotated[float, Doc("lower end of its range, SI")]
     high: Annotated[float, Doc("upper end of its range, SI")]
@@ -31,7 +32,7 @@ class CalibrationPoint(TypedDict):
     at: Annotated[dict[str, float], Doc("the measured condition, SI")]
     measured: Annotated[float, Doc("SI")]
     sigma: Annotated[Number, Doc("standard deviation, SI: as given, otherwise from the residuals")]
-    fitted: Annotated[Number, Doc("SI; null where the case has no result")]
+    fitted: Annotated[Number, Doc("as the sensor reads it, SI; null where the case has no result")]
     interval: Annotated[list[float] | None, Doc("ends of the 95 % interval of `fitted`, SI; null without refits")]
     residual: Annotated[Number, Doc("measured less fitted, in standard deviations")]
     leverage: Annotated[
@@ -83,6 +84,7 @@ class SensorOffset(TypedDict):
     offset: Annotated[float, Doc("measured less modelled, SI")]
     deviation: Annotated[float, Doc("its standard deviation, SI")]
     p: Annotated[float, Doc("probability of such an offset where there is none, times the number of results")]
+    share: Annotated[float, Doc("part of the sum of the squares of the residuals that it takes, 0 to 1")]
     p_after: Annotated[
         float, Doc("that of the residuals it leaves, where the model is right; 1 where no test is possible")
     ]
@@ -107,7 +109,7 @@ class CalibrationReport(TypedDict):
     parameters: list[CalibratedParameter]
     correlations: Annotated[list[list[Number]] | None, Doc("over the refits, in the order of `parameters`")]
     chi_square: Annotated[Number, Doc("sum of the squares of the residuals")]
-    freedom: Annotated[int, Doc("degrees of freedom: measured values less unknown parameters")]
+    freedom: Annotated[int, Doc("degrees of freedom: measured values less what is fitted")]
     sigma_given: Annotated[bool, Doc("whether the standard deviations were given")]
     refits: Annotated[int, Doc("refits that the intervals rest on")]
     points: list[CalibrationPoint]

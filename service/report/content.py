@@ -215,7 +215,9 @@ class Report:
         if self.designs is not None and self.best:
             return case_values(self.study, int(self.designs.front.cases[self.best[0]][0]))
         if self.calibrated is not None and self.calibrated.answer is not None:
-            return dict(zip(self.calibrated.names, self.calibrated.answer.values.tolist(), strict=True))
+            unknown = self.calibrated.plan.unknown  # gains and offsets come after these values
+            values = self.calibrated.answer.values.tolist()
+            return {one.paths[0]: value for one, value in zip(unknown, values, strict=False)}
         return {}
 
     @cached_property

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from sprag_study.sentences import Amount, Name
+from sprag_study.sentences import Amount
 from sprag_study.service.faults import SelectionError
 from sprag_study.service.figures.calibration import calibration_figure
 from sprag_study.service.figures.ribbons import ribbon_figure
 from sprag_study.service.languages import _
-from sprag_study.service.reading.catalogue import unit_of
 from sprag_study.service.reading.reader import Phrase, joined, plural
 from sprag_study.service.results.defaults import drawn_results
 from sprag_study.service.results.headlines.along import judged_by
@@ -72,9 +71,11 @@ def calibration_part(found: Calibration) -> DrivesPart:
 def _values(found: Calibration) -> Iterator[str]:
     known = found.answer
     assert known is not None
-    for index, name in enumerate(found.names):
-        unit = unit_of(found.study, name)
-        value = Phrase("{name} = {value}", name=Name(name), value=Amount(known.values[index], unit, 6))
+    for index in range(len(found.names)):
+        unit = found.unit(index)
+        value = Phrase(
+            "{name} = {value}", name=found.called(index, within=False), value=Amount(known.values[index], unit, 6)
+        )
         if known.intervals is None:
             yield joined("", (value, "."))
             continue

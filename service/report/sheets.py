@@ -305,11 +305,11 @@ def _values(report: Report) -> Iterator[Section]:
     found = report.calibrated
     known = None if found is None else found.answer
     rows: list[tuple[Words, ...]] = []
-    for index, name in enumerate([] if known is None else found.names):  # type: ignore[union-attr]
-        unit = next(item.unit for item in report.inputs if item.path == name)
+    for index in range(0 if known is None else len(found.names)):  # type: ignore[union-attr]
+        unit = found.unit(index)  # type: ignore[union-attr]
         low, high = (None, None) if known.intervals is None else known.intervals[index].tolist()  # type: ignore[union-attr]
         ends = (Amount(end, unit, DIGITS) for end in (low, high))
-        rows.append((Name(name), Amount(float(known.values[index]), unit, DIGITS), *ends))  # type: ignore[union-attr]
+        rows.append((found.called(index, within=False), Amount(float(known.values[index]), unit, DIGITS), *ends))  # type: ignore[union-attr]
     if rows:
         heads = ("", _("Value"), _("95 % interval from"), _("to"))
         yield Section(_("Fitted values"), (Table(heads, tuple(rows), (1, 2, 3)),), 2)

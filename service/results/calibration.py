@@ -94,8 +94,29 @@ class Calibration:
 
     @property
     def names(self) -> list[str]:
-        """Names of the unknown parameters."""
-        return [one.paths[0] for one in self.plan.unknown]
+        """Names of what is fitted: the unknown parameters, then gains and offsets of sensors."""
+        return [one.paths[0] for one in self.plan.fitted]
+
+    def sensor(self, place: int) -> str:
+        """The result whose sensor has the gain or offset at that place of `names`; "" for a parameter."""
+        return "" if place < len(self.plan.unknown) else self.names[place].rpartition(".")[0]
+
+    def unit(self, place: int) -> str:
+        """The unit of what is at that place of `names`."""
+        result, name = self.sensor(place), self.names[place]
+        if not result:
+            return unit_of(self.study, name)
+        return "1" if name.endswith(".gain") else self.infos[result].unit
+
+    def called(self, place: int, *, within: bool = True) -> Name | Phrase:
+        """What it is called, within a sentence or at the beginning."""
+        result, name = self.sensor(place), self.names[place]
+        if not result:
+            return Name(name, within=within)
+        about = {"name": Name(result, within=True)}
+        if name.endswith(".gain"):
+            return Phrase("gain of {name}", **about) if within else Phrase("Gain of {name}", **about)
+        return Phrase("offset of {name}", **about) if within else Phrase("Offset of {name}", **about)
 
 
 def plan_of(study: Study) -> CalibratePlan:
@@ -152,7 +173,7 @@ def calibration_json(study_id: str, found: Calibration) -> CalibrationReport:
         "complete": found.summary["complete"],
         "loss": plan.loss,
         "seed": plan.seed,
-        "parameters": [_parameter(found, index) for index in range(len(plan.unknown))],
+        "parameters": [_parameter(found, index) for index in range(len(plan.fitted))],
         "correlations": None if known is None or known.correlations is None else _rows(known.correlations),
         "chi_square": None if known is None else known.chi_square,
         "freedom": plan.freedom if known is None else known.freedom,
@@ -174,13 +195,14 @@ def _rows(matrix: NDArray[np.float64]) -> list[list[float | int | None]]:
 
 
 def _parameter(found: Calibration, index: int) -> CalibratedParameter:
-    one, known = found.plan.unknown[index], found.answer
+    one, known = found.plan.fitted[index], found.answer
     interval = None if known is None or known.intervals is None else known.intervals[index].tolist()
     touching = (False, False) if known is None or known.at_bounds is None else known.at_bounds[index].tolist()
     return {
         "name": one.paths[0],
-        "paths": list(one.paths),
-        "unit": unit_of(found.study, one.paths[0]),
+        "paths": [] if found.sensor(index) else list(one.paths),
+        "sensor": found.sensor(index) or None,
+        "unit": found.unit(index),
         "low": one.low,
         "high": one.high,
         "value": None if known is None else float(known.values[index]),
@@ -267,6 +289,7 @@ def _offsets(found: Calibration) -> list[SensorOffset]:
             "offset": one.value,
             "deviation": one.deviation,
             "p": one.p,
+            "share": one.share,
             "p_after": one.rest,
         }
         for one in (found.answer.offsets if found.answer else ())
@@ -314,6 +337,8 @@ def calibration_csv(found: Calibration, shown: Units) -> bytes:
 
 #: Probability below which a chi-square is not explained by chance.
 _CHANCE: Final = 0.01
+#: Part of the squares of the residuals that an offset has to take where the rest is no chance.
+_MOST_OF: Final = 0.9
 #: Standard deviations from which on a point is named.
 _FAR: Final = 4.0
 #: Share of refits that may end before they converge without a word.
@@ -385,15 +410,16 @@ def _fits(found: Calibration) -> Iterator[Phrase]:
 def _shifted(found: Calibration, known: Answer) -> Iterator[Phrase]:
     """The offset that would explain the residuals."""
     offset = min(known.offsets, key=lambda one: one.p, default=None)
-    if offset is not None and offset.p < _CHANCE and offset.rest >= _CHANCE:
+    if offset is not None and offset.p < _CHANCE and (offset.rest >= _CHANCE or offset.share >= _MOST_OF):
         result = found.plan.results[offset.column]
         unit = found.infos[result].unit
         yield Phrase(
-            "An offset of {name} by {offset} (standard deviation {deviation}) would explain the residuals (p = {p}): "
-            "check the zero of its sensor.",
+            "An offset of {name} by {offset} (standard deviation {deviation}) would explain {share} % of the squares "
+            "of the residuals (p = {p}): check the zero of its sensor, or calibrate it too by `sensors`.",
             name=Name(result, within=True),
             offset=Amount(offset.value, unit, 3, form="+.3g"),
             deviation=Amount(offset.deviation, unit, 2, form=".2g"),
+            share=round(100.0 * offset.share),
             p=Amount(offset.p, "1", 2, form=".2g"),
         )
 
@@ -441,13 +467,12 @@ def _chi_square_above(value: float, freedom: int) -> float:
 
 
 def _undetermined(found: Calibration, one: Direction) -> Phrase:
-    paths = [found.names[place] for place in one.parameters]
-    names = [Name(path, within=True) for path in paths]
+    names = [found.called(place) for place in one.parameters]
     if len(names) == 1:
         return Phrase("These points do not determine {name}.", name=names[0])
     changes = [
-        Phrase("{name} by {change}", name=name, change=Amount(change, unit_of(found.study, path), 3, form="+.3g"))
-        for path, name, change in zip(paths, names, one.changes, strict=True)
+        Phrase("{name} by {change}", name=name, change=Amount(change, found.unit(place), 3, form="+.3g"))
+        for place, name, change in zip(one.parameters, names, one.changes, strict=True)
     ]
     parts = {"names": _listed(names), "changes": _listed(changes)}
     if one.undetermined:
@@ -458,8 +483,8 @@ def _undetermined(found: Calibration, one: Direction) -> Phrase:
 def _bounds(found: Calibration, known: Answer) -> Iterator[Phrase]:
     if known.at_bounds is None:
         return
-    for one, path, (low, high) in zip(found.plan.unknown, found.names, known.at_bounds.tolist(), strict=True):
-        unit, name = unit_of(found.study, path), Name(path, within=True)
+    for place, (one, (low, high)) in enumerate(zip(found.plan.fitted, known.at_bounds.tolist(), strict=True)):
+        unit, name = found.unit(place), found.called(place)
         ends = [Amount(end, unit, 4, form=".4g") for end, reached in ((one.low, low), (one.high, high)) if reached]
         if len(ends) == 1:
             yield Phrase(
@@ -567,7 +592,7 @@ def _next_point(found: Calibration, known: Answer) -> Iterator[Phrase]:
     yield Phrase(
         "A further measurement says most at {condition}: the interval of {name} would become {share} % narrower.",
         condition=joined(", ", at),
-        name=Name(found.names[best], within=True),
+        name=found.called(best),
         share=Amount(100.0 * float(one.narrower[best]), "1", 2, form=".2g"),
     )
 

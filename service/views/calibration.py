@@ -64,7 +64,7 @@ class CalibrationView(StudyView[CalibrationQuestion, None, Calibration]):
         """What else should be known before the values are used; values, correlations, measured points."""
         found = answer.result
         report = calibration_json(answer.study_id, found)
-        tables = [_values(report), *_correlations(report), *_points(found, report)]
+        tables = [_values(found, report), *_correlations(found, report), *_points(found, report)]
         return Shown(found.sentences[1:], tables)
 
 
@@ -73,10 +73,12 @@ def _ends(interval: Sequence[float] | None, unit: str) -> Cell:
     return None if interval is None else joined(" … ", [Amount(end, unit, 5, bare=True) for end in interval])
 
 
-def _values(report: CalibrationReport) -> ShownTable:
+def _values(found: Calibration, report: CalibrationReport) -> ShownTable:
     rows: list[list[Cell]] = []
-    for one in report["parameters"]:
-        own = joined(" = ", map(Name, one["paths"]))
+    for place, one in enumerate(report["parameters"]):
+        own = (
+            joined(" = ", map(Name, one["paths"])) if one["paths"] else joined("", [found.called(place, within=False)])
+        )
         cells = (one["value"], one["interval"], one["deviation"], [one["low"], one["high"]])
         unit = one["unit"]
         rows.append(
@@ -96,11 +98,13 @@ def _values(report: CalibrationReport) -> ShownTable:
     return ShownTable(Phrase("Values"), [Column(Phrase(title)) for title in titles], rows)
 
 
-def _correlations(report: CalibrationReport) -> Iterator[ShownTable]:
+def _correlations(found: Calibration, report: CalibrationReport) -> Iterator[ShownTable]:
     names = [one["name"] for one in report["parameters"]]
     if report["correlations"] and len(names) > 1:
-        rows = [[joined("", [Name(name)]), *row] for name, row in zip(names, report["correlations"], strict=True)]
-        yield ShownTable(Phrase("Correlations"), [Column(Phrase("Parameter")), *map(Column, names)], rows)
+        called = [joined("", [found.called(place, within=False)]) for place in range(len(names))]
+        rows = [[name, *row] for name, row in zip(called, report["correlations"], strict=True)]
+        heads = [name if not found.sensor(place) else called[place] for place, name in enumerate(names)]
+        yield ShownTable(Phrase("Correlations"), [Column(Phrase("Parameter")), *map(Column, heads)], rows)
 
 
 def _points(found: Calibration, report: CalibrationReport) -> Iterator[ShownTable]:

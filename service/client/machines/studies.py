@@ -114,6 +114,7 @@ class Studies(Draft):
         *,
         unknown: Entries,
         measured: Any,
+        sensors: Results | None = None,
         loss: Literal["linear", "soft_l1", "huber", "cauchy"] | None = None,
         refits: int | None = None,
         seed: int | None = None,
@@ -127,6 +128,9 @@ class Studies(Draft):
         measured : table
             A frame, a mapping of columns or a sequence of mappings, as `cases` of `sprag.run`, or {"csv": text}; a cell
             without a value was not measured.
+        sensors : values, optional
+            Gain and offset of sensors, each of a measured result; others read it as it is; fields result, gain, offset;
+            needed: result.
         loss : values, optional
             How much a large residual counts: linear (least squares), or less with the others.
         refits : int, optional
@@ -138,6 +142,7 @@ class Studies(Draft):
             calibrate=known(
                 unknown=self._entries(unknown, "values"),
                 measured=measured_of(measured),
+                sensors=results_of(sensors),
                 loss=loss,
                 refits=refits,
                 seed=seed,

@@ -15,8 +15,9 @@ from sprag_study.worker import models
 from sprag_study.worker.limits import MAX_NAME_LENGTH
 from sprag_study.worker.planning.calibrate.plan import LOSSES
 
-#: Rows for unknown parameters.
+#: Rows for unknown parameters, and for sensors.
 ROWS: Final = 6
+SENSORS: Final = 3
 _SUFFIX: Final = ", calibrated"
 
 
@@ -28,13 +29,26 @@ def calibration_spec(spec: Mapping[str, Any], values: Mapping[str, str]) -> dict
         for row in range(ROWS)
         if (path := values.get(f"path{row}", "").strip())
     ]
+    sensors = [
+        {"result": result, **_factors(values, row)}
+        for row in range(SENSORS)
+        if (result := values.get(f"sensor{row}", "").strip())
+    ]
     name = str(spec.get("name", ""))[: MAX_NAME_LENGTH - len(_SUFFIX)] + _SUFFIX
     measured = {"csv": values.get("measured", "")}
-    return {
-        **kept,
-        "name": name,
-        "calibrate": {"unknown": unknown, "measured": measured, "loss": values.get("loss", LOSSES[0])},
-    }
+    calibrate = {"unknown": unknown, "measured": measured, "loss": values.get("loss", LOSSES[0])}
+    return {**kept, "name": name, "calibrate": calibrate | ({"sensors": sensors} if sensors else {})}
+
+
+def _factors(values: Mapping[str, str], row: int) -> dict[str, Any]:
+    """Gain and offset of a row of sensors: a range, or one value where the second field is empty."""
+    factors: dict[str, Any] = {}
+    for factor in ("gain", "offset"):
+        texts = {name: values.get(f"{factor}_{name}{row}", "").strip() for name in ("from", "to")}
+        if any(texts.values()):
+            ends = Filled({f"/{name}": text for name, text in texts.items()}).ranged()
+            factors[factor] = ends if texts["to"] else ends["from"]
+    return factors
 
 
 def fields(context: Context, study_id: str, values: Mapping[str, str], faults: Sequence[Fault]) -> dict[str, Any]:
@@ -49,6 +63,7 @@ def fields(context: Context, study_id: str, values: Mapping[str, str], faults: S
         "values": values,
         "faults": faults,
         "rows": range(ROWS),
+        "sensors": range(SENSORS),
         "paths": [(path, reading.caption(path), unit_of(study, path), study.base[path]) for path in paths],
         "results": [(info.name, info.unit) for info in infos],
         "losses": LOSSES,

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sprag_study.sentences import Amount, Name
-from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.sentences import Amount
 from sprag_study.service.reading.reader import Phrase, joined, plural
 from sprag_study.service.results.headlines.headline import MOST, NOTHING, Headline, KeyNumber, digits
 
@@ -17,15 +16,15 @@ def calibrated_headline(found: Calibration) -> Headline:
     """The answer of a calibration as far as it has come."""
     if found.answer is None:
         return Headline()
-    every = tuple(_parameter(found, place) for place in range(len(found.plan.unknown)))
+    every = tuple(_parameter(found, place) for place in range(len(found.plan.fitted)))
     amounts = (
         Amount(value, one.unit, one.digits) for one, value in zip(every, found.answer.values.tolist(), strict=True)
     )
     values = joined(
         "; ",
         (
-            Phrase("{name} = {value}", name=Name(one.label, within=place > 0), value=value)
-            for place, (one, value) in enumerate(zip(every, amounts, strict=True))
+            Phrase("{name} = {value}", name=found.called(place, within=place > 0), value=value)
+            for place, value in enumerate(amounts)
         ),
     )
     count = len(found.plan.values)
@@ -42,11 +41,13 @@ def _parameter(found: Calibration, place: int) -> KeyNumber:
     """An unknown parameter with its interval and what it was before."""
     known, path = found.answer, found.names[place]
     assert known is not None
-    unit, value, before = unit_of(found.study, path), float(known.values[place]), found.study.base.get(path)
+    unit, value, before = found.unit(place), float(known.values[place]), found.study.base.get(path)
     low, high = (None, None) if known.intervals is None else known.intervals[place].tolist()
     count = digits(value, None if low is None else 0.5 * (high - low))
     where = NOTHING
     if low is not None:
         where = Phrase("{low} to {high}", low=Amount(low, unit, count, bare=True), high=Amount(high, unit, count))
     note = NOTHING if before is None else Phrase("{value} before", value=Amount(before, unit, 4))
-    return KeyNumber(path, value, unit, count, low, high, where=where, note=note)
+    called = found.called(place, within=False)
+    label = called if isinstance(called, Phrase) else path
+    return KeyNumber(label, value, unit, count, low, high, where=where, note=note)

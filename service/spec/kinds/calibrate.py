@@ -2,24 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-from sprag_study.sentences import Sentence, plural
+from sprag_study.sentences import Amount, Sentence, plural
+from sprag_study.service.reading.limits import number_in, quoted
+from sprag_study.service.reading.texts import quantity_text
+from sprag_study.service.reading.units import parse_quantity
 from sprag_study.service.spec.axes.axes import PATHS, check_paths
-from sprag_study.service.spec.described import Described, Listed, Record, choice, named
+from sprag_study.service.spec.described import Described, Listed, Record, Variants, choice, named
 from sprag_study.service.spec.fields import expanded
 from sprag_study.service.spec.kinds.draft import Kind
-from sprag_study.service.spec.kinds.fields import read_ends, read_path_of
+from sprag_study.service.spec.kinds.fields import RESULT, read_ends, read_path_of, read_result
 from sprag_study.service.spec.kinds.measured_points import MeasuredTable, read_results, read_table
+from sprag_study.service.spec.lists import refuse_mixed
 from sprag_study.service.spec.node import Node
 from sprag_study.service.spec.schema.quantity import QUANTITY
 from sprag_study.worker.errors import WrongPlanError
 from sprag_study.worker.planning.calibrate.plan import (
     LOSSES,
     MOST_MEASURED,
+    MOST_SENSORS,
     MOST_UNKNOWN,
     REFITS,
     CalibratePlan,
+    Sensor,
     Unknown,
 )
 
@@ -32,12 +39,27 @@ _CSV: Final = (
 )
 _LOSS: Final = "how much a large residual counts: linear (least squares), or less with the others"
 _REFITS: Final = "refits of the bootstrap, which gives the intervals; 0 for none"
+_GAIN: Final = "how many times the modelled value the sensor reads: a number, or from .. to where it is fitted too"
+_OFFSET: Final = "what the sensor reads at a modelled value of 0: a quantity, or from .. to where it is fitted too"
+_RANGE: Final = Record({"from": QUANTITY, "to": QUANTITY}, required=("from", "to"))
+#: Gains of sensors.
+_GAINS: Final = (0.01, 100.0)
+_SENSOR: Final = Record(
+    {"result": RESULT, "gain": Variants([QUANTITY, _RANGE], _GAIN), "offset": Variants([QUANTITY, _RANGE], _OFFSET)},
+    required=("result",),
+    some=("gain", "offset"),
+)
+_SENSORS: Final = Listed(
+    "sensors", 1, MOST_SENSORS, "gain and offset of sensors, each of a measured result; others read it as it is",
+    item=_SENSOR,
+)  # fmt: skip
 _UNKNOWN: Final = Record({"path": PATHS, "from": QUANTITY, "to": QUANTITY}, required=("path", "from", "to"))
 _MEASURED: Final = Record({"csv": {"type": "string", "description": _CSV}}, required=("csv",))
 CALIBRATE: Final = Record(
     {
         "unknown": Listed("parameters", 1, MOST_UNKNOWN, "what is unknown, each between two values", item=_UNKNOWN),
         "measured": _MEASURED,
+        "sensors": _SENSORS,
         **named(
             choice("loss", _LOSS, *LOSSES, default="linear"),
             Described("refits", "Refits", _REFITS, "whole", *REFITS, 200),
@@ -67,7 +89,7 @@ def _read(draft: Draft) -> Finish | None:
     draft.vary([*((one.paths, (one.low, one.high)) for one in unknown), *(((path,), own) for path, own in columns)])
 
     def make_plan() -> None:
-        draft.plan = _read_plan(measured["csv"], unknown, table, **other)
+        draft.plan = _read_plan(node, unknown, table, **other)
 
     return make_plan
 
@@ -103,12 +125,16 @@ def _read_plan(
     node: Node, unknown: tuple[Unknown, ...], table: MeasuredTable, loss: Any, refits: int, seed: int
 ) -> dict[str, Any] | None:
     """The plan as plain JSON data; None, and the faults recorded, where the measured results are invalid."""
-    measured = read_results(node, table)
+    text = node["measured"]["csv"]
+    measured = read_results(text, table)
     if measured is None:
         return None
-    count, least = sum(len(one.values) for one in measured), len(unknown) + 1
+    sensors = _read_sensors(node, [one.result for one in measured])
+    if sensors is None:
+        return None
+    count, least = sum(len(one.values) for one in measured), len(unknown) + sum(len(one.unknown) for one in sensors) + 1
     if not least <= count <= MOST_MEASURED:
-        node.refuse(
+        text.refuse(
             "out-of-range", plural("has {count} measured value", "has {count} measured values", count), count,
             allowed=Sentence(
                 "{low} to {high}: more values than unknown parameters", low=str(least), high=MOST_MEASURED
@@ -116,7 +142,57 @@ def _read_plan(
         )  # fmt: skip
         return None
     try:
-        return CalibratePlan(unknown, table.paths, table.conditions, measured, loss, refits, seed).to_json()
+        plan = CalibratePlan(unknown, table.paths, table.conditions, measured, loss, refits, seed, sensors)
+        return plan.to_json()
     except WrongPlanError as error:
-        node.refuse("too-many", error.message, None, allowed="fewer different points or unknown parameters")
+        text.refuse("too-many", error.message, None, allowed="fewer different points or unknown parameters")
         return None
+
+
+def _read_sensors(calibrate: Node, measured: list[str]) -> tuple[Sensor, ...] | None:
+    """Gains and offsets of the measured results; None, and the faults recorded, where they are invalid."""
+    if not calibrate["sensors"].given:
+        return ()
+    before, sensors = calibrate.report.found, list[Sensor]()
+    for item in CALIBRATE.items(calibrate, "sensors"):
+        if not _SENSOR.read(item):
+            continue
+        info = read_result(item["result"])
+        if info is None:
+            continue
+        if info.name not in measured:
+            item["result"].refuse("conflict", "is not a measured result", allowed=quoted(measured))
+        if any(one.result == info.name for one in sensors):
+            item["result"].refuse("repeated", "names the same result twice", allowed="each once")
+        if not item["gain"].given and not item["offset"].given:
+            item.refuse("required", "has neither a gain nor an offset", None, allowed="one of them, or both")
+        gain, offset = _read_factor(item["gain"], "1", 1.0), _read_factor(item["offset"], info.unit, 0.0)
+        if gain is not None and not _GAINS[0] <= gain[0] <= gain[1] <= _GAINS[1]:
+            low, high = (Amount(end) for end in _GAINS)
+            item["gain"].refuse(
+                "out-of-range", "is out of range", allowed=Sentence("{low} to {high}", low=low, high=high)
+            )
+        if gain is not None and offset is not None:
+            sensors.append(Sensor(info.name, gain, offset))
+    return None if calibrate.report.found > before else tuple(sensors)
+
+
+def _read_factor(node: Node, unit: str, default: float) -> tuple[float, float] | None:
+    """The ends of a gain or an offset in SI, equal where it is given; None, and a fault recorded, where it is none."""
+    if not node.given:
+        return default, default
+    such = Sentence("{number}, or such a range from .. to", number=number_in(unit))
+    if not isinstance(node.value, Mapping):
+        value = node.parsed(lambda given: parse_quantity(given, unit), allowed=such, unit=unit)
+        return None if value is None else (value, value)
+    if not _RANGE.read(node) or refuse_mixed([node["from"], node["to"]], unit):
+        return None
+    ends = [
+        node[name].parsed(lambda given: parse_quantity(given, unit), allowed=number_in(unit), unit=unit)
+        for name in ("from", "to")
+    ]
+    known = sorted(end for end in ends if end is not None)
+    if len(known) == 2 and known[0] == known[1]:
+        node.refuse("invalid-range", "begins where it ends", quantity_text(known[0], unit), allowed="two values")
+        return None
+    return (known[0], known[1]) if len(known) == 2 else None

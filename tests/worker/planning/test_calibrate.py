@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import optimize, stats
 
 from sprag_study.worker.planning import planner_of
-from sprag_study.worker.planning.calibrate import CalibratePlan, CalibratePlanner
+from sprag_study.worker.planning.calibrate import CalibratePlan, CalibratePlanner, Sensor
 from sprag_study.worker.planning.calibrate.answer import Answer, answer
 from sprag_study.worker.planning.rounds import Rows
 from tests.worker.planning.calibrating import Form, calibrated, plan_of, rows_of
@@ -230,6 +230,63 @@ def test_a_plan_names_what_is_wrong(change: dict[str, Any], named: str) -> None:
     with pytest.raises(ValueError, match=f"calibrate.{named}"):
         CalibratePlan(**(fields | change))
     assert CalibratePlan.from_json(plan.to_json()) == plan
+
+
+def test_an_offset_and_a_gain_are_fitted_beside_the_parameters_at_no_cost() -> None:
+    """Against the least squares of scipy with the same unknowns."""
+
+    def form(parameters: Floats, at: Floats) -> dict[str, Floats]:
+        y = _rise(parameters, at)["y"]
+        return {"y": y, "z": np.exp(-parameters[:, 1] * at[:, 0])}
+
+    rng = np.random.default_rng(5)
+    exact = form(np.tile(TRUE, (len(X), 1)), X[:, None])
+    y, z = 1.1 * exact["y"] + 0.02 * rng.normal(size=15), 0.9 * exact["z"] + 0.3 + 0.02 * rng.normal(size=15)
+    sensors = (Sensor("z", (0.2, 20.0), (-5.0, 5.0)), Sensor("y", gain=(1.1, 1.1)))
+    plan = plan_of(WIDE, X, {"y": y, "z": z}, np.full(15, 0.02), refits=100, sensors=sensors)
+    assert [one.paths[0] for one in plan.fitted] == ["a", "b", "z.gain", "z.offset"]
+    assert CalibratePlan.from_json(plan.to_json()) == plan
+    planner, rounds = calibrated(plan, form)
+    found = answer(planner.plan, planner.space, planner.state)
+    assert found is not None
+
+    def residuals(p: Floats) -> Floats:
+        own = form(np.tile(p[:2], (len(X), 1)), X[:, None])
+        return np.concatenate([1.1 * own["y"] - y, p[2] * own["z"] + p[3] - z]) / 0.02
+
+    expected = optimize.least_squares(residuals, [2.0, 1.0, 1.0, 0.0], xtol=1e-14, ftol=1e-14)
+    assert found.values == pytest.approx(expected.x, rel=1e-6)
+    assert (found.chi_square, found.freedom) == pytest.approx((2.0 * expected.cost, 26))
+    assert found.leverages.sum() == pytest.approx(4.0)
+    deviations = np.sqrt(np.diag(np.linalg.inv(expected.jac.T @ expected.jac)))
+    assert found.deviations == pytest.approx(deviations, rel=0.35)
+    assert found.modelled[:15] == pytest.approx(1.1 * form(expected.x[None, :2], X[:, None])["y"], rel=1e-6)
+    assert all(rows.points.shape[1] == 3 for rows in rounds), "cases vary the parameters and the condition alone"
+    points = np.concatenate([rows.points for rows in rounds])
+    assert len(np.unique(points, axis=0)) == len(points) <= plan.most_cases
+    alone = plan_of(WIDE, X, {"y": y / 1.1, "z": (z - 0.3) / 0.9}, np.full(15, 0.02), refits=100)
+    assert plan.most_cases == alone.most_cases
+
+
+def test_what_an_offset_imitates_cannot_be_separated_from_it() -> None:
+    plan = plan_of([(-5.0, 5.0)] * 2, X, {"y": _measured(_line)}, refits=30, sensors=(Sensor("y", (1, 1), (-1, 1)),))
+    (direction,) = _answer(plan, _line).directions
+    assert direction.undetermined
+    assert set(direction.parameters) == {0, 2}
+
+
+@pytest.mark.parametrize(
+    ("sensors", "named"),
+    [
+        ((Sensor("z"),), "sensors.0"),
+        ((Sensor("y", (0.0, 1.0)),), "sensors.0.gain"),
+        ((Sensor("y", (1.0, 1.0), (1.0, -1.0)),), "sensors.0.offset"),
+        ((Sensor("y"), Sensor("y")), "sensors"),
+    ],
+)
+def test_a_plan_names_what_is_wrong_with_a_sensor(sensors: tuple[Sensor, ...], named: str) -> None:
+    with pytest.raises(ValueError, match=rf"calibrate.{named} "):
+        plan_of(WIDE, X, {"y": _measured()}, sensors=sensors)
 
 
 @pytest.mark.parametrize("seed", [1, 3])

@@ -155,7 +155,7 @@ def answer(plan: CalibratePlan, space: Space, state: State) -> Answer | None:
     if intervals is not None and at_bounds is not None:
         # Refits stay where they began along a direction that the data do not determine.
         for place in loose:
-            intervals[place] = plan.unknown[place].low, plan.unknown[place].high
+            intervals[place] = plan.fitted[place].low, plan.fitted[place].high
             at_bounds[place] = True
     return Answer(
         complete=state.phase == ENDED,

@@ -101,7 +101,7 @@ def course(plan: CalibratePlan, space: Space, state: State) -> Generator[Request
         best = int(costs.argmin())
         if attempt or costs[best] > state.best.costs[0] - _BEGIN_AGAIN:
             break
-        again = fit(state.data, places[best : best + 1], found[best : best + 1], plan.fit_sets)
+        again = fit(state.data, places[best : best + 1], found[best : best + 1], plan.places_of(plan.fit_sets))
         state.best = _least((yield from _through(plan, state, FIT_PHASE, again)))
         yield from _scaled(plan, state)
     yield from _curves(plan, state)
@@ -113,11 +113,48 @@ def _anywhere(
     """Scan the ranges and fit from the best places: the best of these fits."""
     scan = space.scan(plan.scan, draws)
     modelled = yield from _run(plan, state, phase, scan)
+    if len(plan.fitted) > len(plan.unknown):
+        scan, modelled = _levelled(plan, space, state, scan, modelled)
     first = phase == SCAN_PHASE
     starts = _starts(scan, state.data.costs(modelled), STARTS if first else 2 * STARTS)
     sets = plan.fit_sets if first else min(plan.fit_sets, _left(plan, state))
-    again = fit(state.data, scan[starts], modelled[starts], sets)
+    again = fit(state.data, scan[starts], modelled[starts], plan.places_of(sets))
     return _least((yield from _through(plan, state, FIT_PHASE, again)))
+
+
+def _levelled(
+    plan: CalibratePlan, space: Space, state: State, places: Floats, modelled: Floats
+) -> tuple[Floats, Floats]:
+    """Sets of parameters with the gains and offsets that fit each best, and their modelled values, without a case.
+
+    They are those of a weighted regression of the measured on the modelled values, within their ranges.
+    """
+    places, read, place = places.copy(), modelled.copy(), len(plan.unknown)
+    for one in plan.sensors:
+        rows = plan.places[1] == plan.results.index(one.result)
+        gains, offsets = one.gain[0] < one.gain[1], one.offset[0] < one.offset[1]
+        values = space.values(places)
+        gain = values[:, place] if gains else np.full(len(values), one.gain[0])
+        offset = values[:, place + gains] if offsets else np.full(len(values), one.offset[0])
+        plain = (modelled[:, rows] - offset[:, None]) / gain[:, None]
+        share = np.where(np.isnan(plain), 0.0, state.data.weights[rows] ** 2)
+        share /= np.maximum(total(share), 1e-300)[:, None]
+        known, measured = np.nan_to_num(plain), state.data.values[rows]
+        centre, middle = total(share * known) * offsets, np.where(offsets, total(share * measured), offset)
+        if gains:
+            about = known - centre[:, None]
+            slope = total(share * about * (measured - middle[:, None]))
+            gain = np.clip(slope / np.maximum(total(share * about**2), 1e-300), *one.gain)
+            places[:, place] = space.coordinates(place, gain)
+        if offsets:
+            places[:, place + gains] = space.coordinates(place + gains, np.clip(middle - gain * centre, *one.offset))
+        values = space.values(places)
+        gain = values[:, place] if gains else gain
+        offset = values[:, place + gains] if offsets else offset
+        read[:, rows] = gain[:, None] * plain + offset[:, None]
+        place += gains + offsets
+    state.library.append((places, read))
+    return places, read
 
 
 def _around_best(plan: CalibratePlan, state: State, attempt: int) -> Generator[Request, Floats, None]:
@@ -135,6 +172,9 @@ def _around_best(plan: CalibratePlan, state: State, attempt: int) -> Generator[R
 def _left(plan: CalibratePlan, state: State) -> int:
     """Sets of parameters that are left if the refits and the curve are to have theirs."""
     run = sum(len(places) for places, _ in state.library)
+    if plan.sensors:  # sets that differ by gains and offsets only are run once
+        every = np.concatenate([places for places, _ in state.library])
+        run = len(np.unique(every[:, : len(plan.unknown)], axis=0))
     return plan.sets_before_refits - run
 
 
@@ -193,7 +233,7 @@ def _scaled(plan: CalibratePlan, state: State) -> Generator[Request, Floats, Non
     for _ in range(rounds):
         state.data = scaled_data(plan, state.best.modelled[0])
         if rounds > 1:
-            again = fit(state.data, state.best.places, state.best.modelled, plan.fit_sets)
+            again = fit(state.data, state.best.places, state.best.modelled, plan.places_of(plan.fit_sets))
             state.best = _least((yield from _through(plan, state, FIT_PHASE, again)))
     data = first_data(plan) if plan.known_sigma else state.data
     state.data = data.without(np.isnan(state.best.modelled[0]))
@@ -207,7 +247,7 @@ def _searched(plan: CalibratePlan, state: State, draws: Draws) -> Generator[Requ
     """
     best = state.best
     assert best is not None
-    p = len(plan.unknown)
+    p = len(plan.fitted)
     curvature = quadratic(state.data, best.modelled, best.derivatives)[1][0]
     factor = cholesky(curvature + np.eye(p) / _WIDEST**2)
     far = draws.uniforms(plan.scan)
@@ -220,7 +260,7 @@ def _searched(plan: CalibratePlan, state: State, draws: Draws) -> Generator[Requ
     order = np.argsort(state.data.costs(modelled), kind="stable")
     shells = [order[np.floor(_SHELLS * far[order]) == shell][:1] for shell in range(_SHELLS)]
     chosen = np.concatenate(shells)
-    again = fit(state.data, places[chosen], modelled[chosen], plan.fit_sets // 4)
+    again = fit(state.data, places[chosen], modelled[chosen], plan.places_of(plan.fit_sets // 4))
     yield from _taken(plan, state, _least((yield from _through(plan, state, FIT_PHASE, again))))
 
 

@@ -85,6 +85,8 @@ class Offset:
         The offset and its standard deviation, SI.
     p : float
         Probability of as large an offset where there is none, times the number of results (Bonferroni).
+    share : float
+        Part of the sum of the squares of the residuals that it takes, 0 to 1.
     rest : float
         Probability of the residuals that it leaves, where the model is right; 1 where no test is possible.
     """
@@ -93,6 +95,7 @@ class Offset:
     value: float
     deviation: float
     p: float
+    share: float
     rest: float
 
 
@@ -203,7 +206,7 @@ def far_value(plan: CalibratePlan, residuals: Floats, leverages: Floats) -> FarV
         at = int(np.abs(deleted).argmax())
         p = 2.0 * float(stdtr(freedom - 1.0, -abs(deleted[at])))
         if p < worst.p:
-            cook = standard[at] ** 2 * leverage[at] / (1.0 - leverage[at]) / len(plan.unknown)
+            cook = standard[at] ** 2 * leverage[at] / (1.0 - leverage[at]) / len(plan.fitted)
             worst = FarValue(int(rows[at]), float(deleted[at]), float(cook), p)
     return None if worst.place < 0 else replace(worst, p=min(1.0, worst.p * tests))
 
@@ -244,12 +247,13 @@ def offsets(
         value = float(apart @ rest) / size
         left, fall = rest - value * apart, value * value * size
         scatter = 1.0 if plan.known_sigma else max((squares - fall) / (freedom - 1), 1e-300)
-        p = chdtrc(1, fall) if plan.known_sigma else fdtrc(1, freedom - 1, fall / scatter)
+        p = float(chdtrc(1, fall) if plan.known_sigma else fdtrc(1, freedom - 1, fall / scatter))
         if plan.known_sigma:
             after = float(chdtrc(freedom - 1, max(squares - fall, 0.0)))
         else:
             left = np.where(known, left, np.nan)
             test = lack_of_fit(plan, left, sigma, np.minimum(leverages + apart**2 / size, 1.0))
             after = 1.0 if test is None else test.p
-        results.append(Offset(column, value, math.sqrt(scatter / size), min(1.0, float(p) * len(plan.measured)), after))
+        p, share = min(1.0, p * len(plan.measured)), float(fall / squares)
+        results.append(Offset(column, value, math.sqrt(scatter / size), p, share, after))
     return results

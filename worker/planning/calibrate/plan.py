@@ -22,8 +22,8 @@ Loss = Literal["linear", "soft_l1", "huber", "cauchy"]
 #: Value of "kind" in the plan.
 CALIBRATE: Final = "calibrate"
 LOSSES: Final[tuple[Loss, ...]] = ("linear", "soft_l1", "huber", "cauchy")
-#: Bounds of a plan: unknown parameters, measured values, refits of the bootstrap.
-MOST_UNKNOWN, MOST_MEASURED = 12, 2000
+#: Bounds of a plan: unknown parameters, measured values, sensors with a gain or an offset, refits of the bootstrap.
+MOST_UNKNOWN, MOST_MEASURED, MOST_SENSORS = 12, 2000, 12
 REFITS: Final = (0, 1000)
 #: Sets of parameters: the scan has `SCAN` for each unknown, at least `LEAST_SCAN`; starts of the fit, their
 #: iterations on average, and trials of each refit.
@@ -77,6 +77,21 @@ class Measured:
     sigma: tuple[float, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """What a sensor reads: gain * result + offset, each between two values, SI; equal ends give it."""
+
+    result: str
+    gain: tuple[float, float] = (1.0, 1.0)
+    offset: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def unknown(self) -> tuple[Unknown, ...]:
+        """Gain and offset, as far as they are unknown."""
+        ends = {"gain": self.gain, "offset": self.offset}
+        return tuple(Unknown((f"{self.result}.{name}",), *own) for name, own in ends.items() if own[0] < own[1])
+
+
 @dataclass(frozen=True)
 class CalibratePlan:
     """A calibration, in SI.
@@ -94,6 +109,8 @@ class CalibratePlan:
     refits : int
         Refits of the bootstrap that give the intervals; 0 for none.
     seed : int
+    sensors : tuple of Sensor
+        Of results whose measured values are not the modelled ones themselves.
 
     Raises
     ------
@@ -108,12 +125,14 @@ class CalibratePlan:
     loss: Loss = "linear"
     refits: int = 200
     seed: int = 1
+    sensors: tuple[Sensor, ...] = ()
 
     def __post_init__(self) -> None:
         _check(1 <= len(self.unknown) <= MOST_UNKNOWN, "unknown", len(self.unknown), f"1 to {MOST_UNKNOWN} parameters")
         for i, one in enumerate(self.unknown):
             ends = math.isfinite(one.low) and math.isfinite(one.high) and one.low < one.high
             _check(bool(one.paths) and ends, f"unknown.{i}", (one.low, one.high), "paths, and a range")
+        _check_sensors(self)
         _check_measured(self)
         _check(self.loss in LOSSES, "loss", self.loss, ", ".join(LOSSES))
         low, high = REFITS
@@ -124,6 +143,23 @@ class CalibratePlan:
         _check(0 <= self.seed < 2**63, "seed", self.seed, "an integer of at least 0")
         seen = [path for paths in self.paths for path in paths]
         _check(len(set(seen)) == len(seen), "unknown", seen, "each parameter once, unknown or measured")
+
+    @property
+    def fitted(self) -> tuple[Unknown, ...]:
+        """Everything that is fitted: the unknown parameters, then gains and offsets, which cost no cases."""
+        return (*self.unknown, *(each for one in self.sensors for each in one.unknown))
+
+    def readings(self, results: Floats, values: Floats) -> Floats:
+        """Readings of the sensors, shape (sets, conditions, results), of such results and values, (sets, fitted)."""
+        read, column = results.copy() if self.sensors else results, len(self.unknown)
+        for one in self.sensors:
+            factors = []
+            for low, high in (one.gain, one.offset):
+                factors.append(values[:, column, None] if low < high else low)
+                column += low < high
+            place = self.results.index(one.result)
+            read[:, :, place] = factors[0] * read[:, :, place] + factors[1]
+        return read
 
     @property
     def paths(self) -> tuple[tuple[str, ...], ...]:
@@ -142,8 +178,8 @@ class CalibratePlan:
 
     @property
     def freedom(self) -> int:
-        """Degrees of freedom: measured values less unknown parameters."""
-        return self.count - len(self.unknown)
+        """Degrees of freedom: measured values less unknown parameters, gains and offsets."""
+        return self.count - len(self.fitted)
 
     @property
     def scales(self) -> dict[int, int]:
@@ -174,6 +210,10 @@ class CalibratePlan:
         """Sets of parameters of a fit at most: fewer of a large problem."""
         room = MAX_PLANNED_CASES // 2 // len(self.conditions) - self.scan
         return min(STARTS * ITERATIONS * (1 + 2 * len(self.unknown)), room)
+
+    def places_of(self, sets: int) -> int:
+        """Places of a fit that cost so many sets of parameters: differences by gains and offsets cost none."""
+        return sets * (1 + 2 * len(self.fitted)) // (1 + 2 * len(self.unknown))
 
     @property
     def most_cases(self) -> int:
@@ -229,6 +269,7 @@ class CalibratePlan:
                 loss=data["loss"],
                 refits=int(data["refits"]),
                 seed=int(data["seed"]),
+                sensors=tuple(_sensor(one) for one in data.get("sensors", ())),
             )
         except KeyError as error:
             raise ValueError(f"calibrate: {error.args[0]} is missing") from error
@@ -248,7 +289,7 @@ class CalibratePlan:
             "loss": self.loss,
             "refits": self.refits,
             "seed": self.seed,
-        }
+        } | ({"sensors": [_sensor_json(one) for one in self.sensors]} if self.sensors else {})
 
 
 def _measured(data: Mapping[str, Any]) -> Measured:
@@ -260,11 +301,32 @@ def _measured(data: Mapping[str, Any]) -> Measured:
     )
 
 
+def _sensor_json(sensor: Sensor) -> dict[str, Any]:
+    return {"result": sensor.result, "gain": list(sensor.gain), "offset": list(sensor.offset)}
+
+
+def _sensor(data: Mapping[str, Any]) -> Sensor:
+    (gain, offset) = ((float(low), float(high)) for low, high in (data["gain"], data["offset"]))
+    return Sensor(str(data["result"]), gain, offset)
+
+
 def _check(holds: bool, name: str, value: object, allowed: str) -> None:
     if not holds:
         raise WrongPlanError(
             Sentence("calibrate.{name} is {value}; allowed: {allowed}", name=name, value=str(value), allowed=allowed)
         )
+
+
+def _check_sensors(plan: CalibratePlan) -> None:
+    names = [one.result for one in plan.sensors]
+    _check(len(set(names)) == len(names), "sensors", names, "each result once")
+    for i, one in enumerate(plan.sensors):
+        _check(one.result in plan.results, f"sensors.{i}", one.result, "a measured result")
+        _check(
+            0.0 < one.gain[0] <= one.gain[1] < math.inf, f"sensors.{i}.gain", one.gain, "positive, the lower end first"
+        )
+        low, high = one.offset
+        _check(math.isfinite(low) and low <= high < math.inf, f"sensors.{i}.offset", one.offset, "the lower end first")
 
 
 def _check_measured(plan: CalibratePlan) -> None:
@@ -275,7 +337,7 @@ def _check_measured(plan: CalibratePlan) -> None:
     _check(len(set(plan.conditions)) == len(plan.conditions), "conditions", len(plan.conditions), "each once")
     _check(bool(plan.measured), "measured", [], "at least one result")
     _check(len(set(plan.results)) == len(plan.results), "measured", list(plan.results), "each result once")
-    least = len(plan.unknown) + 1
+    least = len(plan.fitted) + 1
     _check(least <= plan.count <= MOST_MEASURED, "measured", plan.count, f"{least} to {MOST_MEASURED:,} values")
     for one in plan.measured:
         lengths = {len(one.at), len(one.values), len(one.sigma) or len(one.at)}

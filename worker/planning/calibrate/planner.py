@@ -33,7 +33,7 @@ class CalibratePlanner:
     def __init__(self, plan: CalibratePlan) -> None:
         self.plan = plan
         self.state = State(first_data(plan))
-        self._space = Space(plan.unknown)
+        self._space = Space(plan.fitted)
         self._known: dict[bytes, dict[bytes, Floats]] = {}
         self._cases = self._rounds = 0
         self._course = course(plan, self._space, self.state)
@@ -100,7 +100,7 @@ class CalibratePlanner:
             "phase": ENDED if self._request is None else state.phase,
             "step": state.round,
             "complete": state.phase == ENDED,
-            "unknown": [one.paths[0] for one in self.plan.unknown],
+            "unknown": [one.paths[0] for one in self.plan.fitted],
             "values": None if best is None else self._space.values(best.places[0]).tolist(),
             "chi_square": square,
             "freedom": self.plan.freedom - failed,
@@ -134,8 +134,9 @@ class CalibratePlanner:
 
     def _all(self, request: Request) -> Floats:
         """The cases of a request that are not known, each once."""
-        values = np.unique(self._space.values(request.places), axis=0, return_index=True)[1]
-        sets = self._space.values(request.places[np.sort(values)])
+        p = len(self.plan.unknown)
+        values = np.unique(self._space.values(request.places)[:, :p], axis=0, return_index=True)[1]
+        sets = self._space.values(request.places[np.sort(values)])[:, :p]
         conditions = np.ascontiguousarray(self._conditions(request))
         keys = [at.tobytes() for at in conditions]
         parts = []
@@ -148,8 +149,9 @@ class CalibratePlanner:
     def _rows(self, request: Request) -> Floats:
         """The known rows of a request, shape (sets, conditions, results)."""
         keys = [at.tobytes() for at in np.ascontiguousarray(self._conditions(request))]
-        known = [self._known[one.tobytes()] for one in self._space.values(request.places)]
-        return np.array([[own[key] for key in keys] for own in known])
+        values = self._space.values(request.places)
+        known = [self._known[one.tobytes()] for one in values[:, : len(self.plan.unknown)]]
+        return self.plan.readings(np.array([[own[key] for key in keys] for own in known]), values)
 
 
 def _chi_square(data: Data, modelled: Floats) -> tuple[float, int]:

@@ -40,6 +40,16 @@ class Space:
         """Derivatives of the values by the coordinates."""
         return np.where(self._log, self.values(places) * self._span, self._high - self._low)
 
+    def coordinates(self, column: int, values: Floats) -> Floats:
+        """The coordinates in 0 .. 1 at which one parameter has these values of its range."""
+        low, high = self._low[column], self._high[column]
+        if self._log[column]:
+            share = (logarithm(values) - self._first[column]) / self._span[column]
+        else:
+            share = (values - low) / (high - low)
+        places: Floats = np.clip(share, 0.0, 1.0)
+        return places
+
     def scan(self, count: int, draws: Draws) -> Floats:
         """A Latin hypercube, shape (count, parameters)."""
         columns = [(draws.permutation(count) + draws.uniforms(count)) / count for _ in range(self.dimensions)]

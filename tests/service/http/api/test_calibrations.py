@@ -93,7 +93,28 @@ def test_a_sensor_that_does_not_read_zero_is_named_without_sigma(service: Servic
     (told,) = [text for text in found["sentences"] if text.startswith("An offset of shaft.speed.mean by +0.")]
     assert "rad/s" in told
     page = service.http.get(f"/studies/{study_id}/matters").text
-    assert "would explain the residuals (p = " in page
+    assert " of the squares of the residuals (p = " in page
+
+
+def test_an_offset_that_is_calibrated_has_an_interval_on_every_front(service: Service) -> None:
+    sensors = [{"result": "shaft.speed.mean", "offset": {"from": "-2 rad/s", "to": "2 rad/s"}}]
+    study_id = calibration(service, unknown=[CALIBRATE["unknown"][1]], measured={"csv": measured(0.8)}, sensors=sensors)
+    found = service.get(f"/studies/{study_id}/calibration")
+    fits(CalibrationReport, found)
+    inertia, offset = found["parameters"]
+    assert (offset["name"], offset["paths"], offset["unit"]) == ("shaft.speed.mean.offset", [], "rad/s")
+    assert (offset["sensor"], inertia["sensor"]) == ("shaft.speed.mean", None)
+    for one, true in ((inertia, INERTIA), (offset, 0.8)):
+        assert one["interval"][0] < true < one["interval"][1]
+    assert found["offsets"] == []
+    assert found["freedom"] == 8
+    page = service.http.get(f"/studies/{study_id}/matters").text
+    assert "Offset of mean shaft speed" in page
+    report = report_of(Library(service.store), study_id)
+    assert report.calibration is not None
+    assert any(text.startswith("Offset of shaft.speed.mean = 0.") for text in report.calibration.sentences)
+    assert list(report.meant) == ["shaft.inertia"]
+    assert service.http.get(f"{API}/studies/{study_id}/report?format=html").status_code == 200
 
 
 def test_a_value_far_off_the_others_is_named_with_its_condition(service: Service) -> None:

@@ -43,11 +43,14 @@ def test_pasted_points_become_a_study(service: Service) -> None:
     fields = {"study": study_id, "measured": CALIBRATE["measured"]["csv"], "loss": "huber"}
     for row, one in enumerate(CALIBRATE["unknown"]):
         fields |= {f"path{row}": one["path"], f"from{row}": str(one["from"]), f"to{row}": str(one["to"])}
+    fields |= {"sensor0": "shaft.speed.mean", "gain_from0": "1,02", "offset_from0": "-1", "offset_to0": "1 rad/s"}
     sent = service.http.post("/calibrate", data=fields, follow_redirects=False)
     assert sent.status_code == 303, sent.text
     made = sent.headers["location"].rpartition("/")[2]
     plan = service.store.studies.study(made).plan
-    expected = service.store.studies.study(service.submit(spec_of(loss="huber", refits=200))).plan
+    offset = {"from": "-1 rad/s", "to": "1 rad/s"}
+    sensors = [{"result": "shaft.speed.mean", "gain": 1.02, "offset": offset}]
+    expected = service.store.studies.study(service.submit(spec_of(loss="huber", refits=200, sensors=sensors))).plan
     assert plan == expected
 
 

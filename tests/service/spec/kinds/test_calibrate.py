@@ -181,6 +181,53 @@ def test_other_faults_of_a_calibration(changes: dict[str, Any], pointer: str, co
     assert (pointer, code) in [(fault.where, fault.code) for fault in error.value.faults]
 
 
+def test_gains_and_offsets_of_sensors_are_read_in_si() -> None:
+    sensors = [
+        {
+            "result": "shaft.speed.mean",
+            "gain": {"from": "105 %", "to": 0.9},
+            "offset": {"from": "-3 rpm", "to": "3 rpm"},
+        },
+        {"result": "efficiency", "gain": 1.02},
+    ]
+    text = "shaft.load,shaft.speed.mean,efficiency\n0.1,20,0.2\n0.2,18,0.3\n0.3,17,0.4\n"
+    plan = read(text, sensors=sensors).study.plan
+    assert plan is not None
+    speed, efficiency = plan["sensors"]
+    assert speed["gain"] == pytest.approx([0.9, 1.05])
+    assert speed["offset"] == pytest.approx([-0.1 * math.pi, 0.1 * math.pi])
+    assert efficiency == {"result": "efficiency", "gain": [1.02, 1.02], "offset": [0.0, 0.0]}
+    assert "sensors" not in (read(text).study.plan or {})
+
+
+@pytest.mark.parametrize(
+    ("sensor", "where", "code"),
+    [
+        ({"result": "shaft.speed.meen", "gain": 1}, "/result", "unknown-name"),
+        ({"result": "efficiency", "gain": 1}, "/result", "conflict"),
+        ({"result": "shaft.speed.mean"}, "", "required"),
+        ({"result": "shaft.speed.mean", "gain": 0}, "/gain", "out-of-range"),
+        ({"result": "shaft.speed.mean", "gain": "1 rpm"}, "/gain", "wrong-type"),
+        ({"result": "shaft.speed.mean", "offset": "1 N"}, "/offset", "wrong-unit"),
+        ({"result": "shaft.speed.mean", "offset": {"from": "1 rpm", "to": "1 rpm"}}, "/offset", "invalid-range"),
+        ({"result": "shaft.speed.mean", "offset": {"from": "1 rpm"}}, "/offset/to", "wrong-type"),
+        ({"result": "shaft.speed.mean", "offset": 0, "bias": 1}, "/bias", "unknown-field"),
+    ],
+)
+def test_faults_of_a_sensor(sensor: dict[str, Any], where: str, code: str) -> None:
+    with pytest.raises(SpecError) as error:
+        parse_spec(spec_of({"sensors": [sensor]}))
+    assert (f"/calibrate/sensors/0{where}", code) in [(fault.where, fault.code) for fault in error.value.faults]
+
+
+def test_gains_and_offsets_count_among_the_unknowns() -> None:
+    offset = {"result": "shaft.speed.mean", "offset": {"from": "-3 rpm", "to": "3 rpm"}}
+    with pytest.raises(SpecError) as error:
+        parse_spec(spec_of({"sensors": [offset]}))
+    assert "has 3 measured values" in error.value.faults[0].message
+    assert str(error.value.faults[0].allowed).startswith("4 to ")
+
+
 @pytest.mark.parametrize("name", ["axes", "goal", "refine", "tolerances"])
 def test_a_calibration_stands_alone(name: str) -> None:
     with pytest.raises(SpecError) as error:
@@ -202,7 +249,7 @@ def test_too_many_points_are_refused() -> None:
 
 def test_the_schema_has_the_calibration() -> None:
     schema = spec_schema()["properties"]["calibrate"]
-    assert set(schema["properties"]) == {"unknown", "measured", "loss", "refits", "seed"}
+    assert set(schema["properties"]) == {"unknown", "measured", "sensors", "loss", "refits", "seed"}
     assert schema["required"] == ["unknown", "measured"]
 
 
