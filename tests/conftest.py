@@ -85,6 +85,9 @@ TOGETHER = (
     ),
 )
 
+#: The fixtures of what the files of a group share.
+SHARED = frozenset({"browser", "office", "running"})
+
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
@@ -104,9 +107,21 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the files that take long."""
+    """Begin with the files that take long, and in a group of `TOGETHER` with the tests that need nothing shared.
+
+    What the group shares ends before a test that needs none of it, and its start takes ten seconds.
+    """
     places = {ROOT / "tests" / name: place for place, name in enumerate(LONG)}
-    items.sort(key=lambda item: places.get(item.path, len(LONG)))
+    groups = {
+        ROOT / name: [places.get(ROOT / other, len(LONG)) for other in names] for names in TOGETHER for name in names
+    }
+
+    def order(item: pytest.Item) -> tuple[int, bool]:
+        if item.path not in groups:
+            return places.get(item.path, len(LONG)), False
+        return min(groups[item.path]), not SHARED.isdisjoint(getattr(item, "fixturenames", ()))
+
+    items.sort(key=order)
 
 
 def pytest_collection_finish() -> None:
