@@ -33,6 +33,7 @@ _HALF: Final = 0.5 * (1.0 - 1e-9)
 _LONG: Final = 0.1
 _WIDER: Final = 1.5
 
+_MEASURED: Final = "/base/excitation/measured"
 #: Frequency of the excitation, in Hz, below which it is slow.
 _SLOW: Final = 0.1
 #: By the kind of a motor the number that is, or multiplies, its largest torque.
@@ -68,6 +69,10 @@ def warn_vibration_drive(report: Report, study: Study) -> None:
         report.warn(
             "no-effect", _place(study, LOAD_FACTOR), Sentence("has no effect: the load is not given as a table")
         )
+    amplitudes = [f"amplitude_{axis}" for axis in "xy" if _values(study, f"excitation.amplitude_{axis}").any()]
+    if report.written(_MEASURED) is not None and amplitudes:
+        text = Sentence("{names} is added to the measured motion", names=", ".join(amplitudes))
+        report.warn("added-vibration", _MEASURED, text)
     if HARMONIC_FACTOR in (*study.base, *study.column_paths) and f"{HARMONICS}0.order" not in study.base:
         report.warn(
             "no-effect", _place(study, HARMONIC_FACTOR), Sentence("has no effect: the vibration has no harmonics")

@@ -303,13 +303,7 @@ def _read_measured(excitation: Node, machine: Drive) -> None:
             "conflict", "is given beside harmonics", None, allowed=N_("either harmonics or one measured period")
         )
         return
-    rows = read_measured_base(node)
-    _take_harmonics(machine, rows)
-    amplitudes = [f"amplitude_{axis}" for axis in "xy"]
-    added = [name for name in amplitudes if machine.values.get(f"{_EXCITATION}.{name}")]
-    if rows and added:
-        text = Sentence("{names} is added to the measured motion", names=", ".join(added))
-        node.report.warn("added-vibration", node.pointer, text)
+    _take_harmonics(machine, read_measured_base(node))
 
 
 def _read_pendulums(node: Node, listed: Listed, machine: Drive) -> None:
