@@ -71,7 +71,7 @@ def warn_vibration_drive(report: Report, study: Study) -> None:
         )
     amplitudes = [f"amplitude_{axis}" for axis in "xy" if _values(study, f"excitation.amplitude_{axis}").any()]
     if report.written(_MEASURED) is not None and amplitudes:
-        text = Sentence("{names} is added to the measured motion", names=", ".join(amplitudes))
+        text = Sentence("has {names} added to it", names=", ".join(amplitudes))
         report.warn("added-vibration", _MEASURED, text)
     if HARMONIC_FACTOR in (*study.base, *study.column_paths) and f"{HARMONICS}0.order" not in study.base:
         report.warn(

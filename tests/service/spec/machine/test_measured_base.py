@@ -99,9 +99,9 @@ def test_what_the_harmonics_leave_is_told() -> None:
     given = {PLACE: {"csv": ANGLED}, "/axes": []}
     assert [warning.code for warning in parsed(given).warnings][:1] == ["reduced-motion"]
     amplitudes = {**STILL, "/base/excitation/amplitude_y": "1 mm"}
-    assert any("amplitude_y is added" in warning for warning in parsed({**amplitudes, **given}).warnings)
+    assert any("has amplitude_y added" in warning for warning in parsed({**amplitudes, **given}).warnings)
     varied = {"path": "excitation.amplitude_x", "values": [0, "1 mm"]}
-    assert any("amplitude_x is added" in text for text in parsed({**STILL, **given, "/axes": [varied]}).warnings)
+    assert any("has amplitude_x added" in text for text in parsed({**STILL, **given, "/axes": [varied]}).warnings)
     saw = csv("angle [deg],x [mm]", DEGREES, DEGREES)
     fault = problems({**STILL, PLACE: {"csv": saw}})[f"{PLACE}/accuracy"]
     assert (fault.code, fault.value) == ("out-of-range", "1 %")
