@@ -14,11 +14,12 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from collections import Counter
 from decimal import Decimal, localcontext
 from fractions import Fraction
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from sprag_study.sentences import Amount, Named, Sentence, Typed, joined, plural
 from sprag_study.service.faults import ClauseError, Code
@@ -53,6 +54,8 @@ _EXAMPLES: Final = {
     "1": ("0.05",),
 }
 
+#: Libraries that pint loads where they are installed.
+_HELD_BY_PINT: Final = ("dask", "uncertainties", "xarray")
 #: How people write per cent.
 PERCENT: Final = frozenset({"%", "percent", "per cent"})
 _PER_MINUTE: Final = Fraction(1, 60)
@@ -322,8 +325,18 @@ def is_unit(name: str) -> bool:
 
 
 def load() -> None:
-    """Load pint now, which takes half a second; otherwise the first quantity with a unit loads it."""
-    _registry()
+    """Load pint now; otherwise the first quantity with a unit loads it. For processes that do nothing else with pint.
+
+    It looks for libraries whose values it can hold, and loads those that are installed, which takes as long as pint.
+    """
+    absent = [name for name in _HELD_BY_PINT if name not in sys.modules]
+    modules: dict[str, Any] = sys.modules
+    modules.update(dict.fromkeys(absent))  # their import fails
+    try:
+        _registry()
+    finally:
+        for name in absent:
+            del modules[name]
 
 
 @lru_cache(maxsize=1)

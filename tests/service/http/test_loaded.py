@@ -31,3 +31,18 @@ def test_the_first_page_loads_nothing_that_computes(tmp_path: Path) -> None:
     command = [sys.executable, "-c", SCRIPT, str(tmp_path / "sprag.sqlite3")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (0, "[]\n"), done.stdout + done.stderr
+
+
+#: What the processes beside it have of pint: the libraries that it would load stay loadable.
+UNITS = """
+import sys
+from sprag_study.service.reading import units
+units.load()
+print(sorted({"dask", "uncertainties", "xarray"} & set(sys.modules)))
+import dask
+"""
+
+
+def test_units_load_no_other_library() -> None:
+    done = subprocess.run([sys.executable, "-c", UNITS], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, "[]\n"), done.stdout + done.stderr
