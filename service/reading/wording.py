@@ -26,8 +26,8 @@ _QUANTITY: Final = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?)(\s?)([A-Za-z][A-Za-z\d
 #: Significant digits of numbers on pages; files and the API have all digits.
 _DIGITS: Final = 5
 _GREEK: Final = {
-    "alpha": "α", "beta": "β", "chi": "χ", "delta": "δ", "eta": "η", "lambda": "λ", "nu": "ν", "phi": "φ", "rho": "ρ",
-    "w": "ω",
+    "alpha": "α", "beta": "β", "chi": "χ", "delta": "δ", "eta": "η", "kappa": "κ", "lambda": "λ", "nu": "ν",
+    "omega": "ω", "phi": "φ", "psi": "ψ", "rho": "ρ", "w": "ω",
 }  # fmt: skip
 
 

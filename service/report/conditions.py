@@ -5,13 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from sprag_study.sentences import Amount
-from sprag_study.service.languages import _
+from sprag_study.service.languages import _, gettext
 from sprag_study.service.reading.catalogue import axes_json
 from sprag_study.service.reading.reader import Phrase, joined, plural
 from sprag_study.service.report.blocks import Section, Table, Text
 from sprag_study.service.results.fronts import goals_of, limits_of
 from sprag_study.service.results.selection import with_tolerance
 from sprag_study.service.results.varied import ends, formula_text, varied, with_distribution
+from sprag_study.worker import models
+from sprag_study.worker.models.vocabulary import bare_caption
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -25,16 +27,19 @@ _ROWS: Final = 26
 #: Digits of what was given, and in the drawing.
 _DIGITS: Final = 5
 _SHORT: Final = 4
+#: What a number is called, and its value.
+_Row = tuple["Words", ...]
 
 
 def conditions(report: Report) -> Iterator[Section]:
     """The section with both columns, and how many inputs are in the appendix only."""
-    rows = [*_varied(report), *_given(report)]
+    given, alike = _given(report)
+    rows = [*_varied(report), *given]
     shown = rows[:_ROWS]
     half = -(-len(shown) // 2)
     columns = [shown[:half], shown[half:]]
     tables = [Table(("", ""), tuple(part), (1,), look="half") for part in columns if part]
-    more = len(report.inputs) - len(shown)
+    more = len(report.inputs) - len(shown) - sum(alike.get(row, 0) for row in shown)
     rest = (
         plural(
             "{count} further input is in the appendix on inputs, most of them with their defaults.",
@@ -73,11 +78,30 @@ def _varied(report: Report) -> Iterator[tuple[Words, ...]]:
         yield report.reading.caption(" = ".join(paths)), with_distribution(report.study, paths[0], value)
 
 
-def _given(report: Report) -> Iterator[tuple[Words, ...]]:
-    """Each number that was given, fitted or derived, and of one with a tolerance that too."""
-    for item in report.inputs:
-        if item.origin in ("given", "fitted", "tolerance", "derived") and item.unit and not _of_no_effect(item):
-            yield report.reading.caption(item.path), _value(report, item)
+def _given(report: Report) -> tuple[list[_Row], dict[_Row, int]]:
+    """Each number that was given, fitted or derived, and of one with a tolerance that too.
+
+    Numbers that are alike in all rows of a list are one row. The second value is how many more inputs a row stands for.
+    """
+    given = {
+        item.path: (report.reading.caption(item.path), _value(report, item)) for item in report.inputs
+        if item.origin in ("given", "fitted", "tolerance", "derived") and item.unit and not _of_no_effect(item)
+    }  # fmt: skip
+    alike = dict[_Row, int]()
+    for rows in models.model_of(report.study.model).presentation.form.lists:
+        by_name = dict[str, list[str]]()
+        for path in given:
+            if rows.every and path.startswith(f"{rows.at}."):
+                by_name.setdefault(path.split(".", 2)[2], []).append(path)
+        count = len({item.path.split(".")[1] for item in report.inputs if item.path.startswith(f"{rows.at}.")})
+        for first, *others in by_name.values():
+            if others and len(others) == count - 1 and {given[path][1] for path in others} == {given[first][1]}:
+                bare = bare_caption(report.study.model, first, gettext)
+                given[first] = row = (f"{bare}, {_(rows.every)}", given[first][1])
+                alike[row] = len(others)
+                for path in others:
+                    del given[path]
+    return list(given.values()), alike
 
 
 def _of_no_effect(item: Input) -> bool:

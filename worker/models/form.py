@@ -28,7 +28,8 @@ class Hidden:
 
 @dataclass(frozen=True, slots=True)
 class FormField:
-    """A field that gives one entry of the base; a name that ends in ``*`` stands for all numbers directly there.
+    """A field that gives one entry of the base; a name that ends in ``*`` stands for all numbers directly there that no
+    other field of the form names.
 
     Attributes
     ----------
@@ -77,7 +78,8 @@ class Option:
 class FormChoice:
     """A choice of the form's own, which the spec has by what else it has.
 
-    Where its ``control`` is a switch, the page has the fields of all options.
+    Where its ``control`` is a switch, the page has the fields of all options. ``several``: a list; where it has one
+    row, the page leaves the choice out while its first option is the chosen one.
     """
 
     name: str
@@ -85,6 +87,7 @@ class FormChoice:
     options: tuple[Option, ...]
     help: str = ""
     control: Literal["select", "radio", "switch"] = "select"
+    several: str = ""
 
 
 @dataclass(frozen=True, slots=True)

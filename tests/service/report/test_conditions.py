@@ -132,3 +132,22 @@ def test_the_first_page_tells_which_curve_its_numbers_are_of(service: Service) -
     assert [block.text for block in first if isinstance(block, Text)][1:] == [
         "Горизонтальна амплітуда = вертикальна амплітуда = 2 мм; Частота збудження = 25 Гц"
     ]
+
+
+def test_what_pendulums_have_in_common_is_one_condition(service: Service, spec: dict[str, Any]) -> None:
+    first = spec["base"]["pendulums"][0]
+    spec["base"]["pendulums"].append(first | {"spring_rate": "18 N/mm"})
+    study_id = service.submit(spec)
+    service.fill(study_id)
+    told = document(service, study_id, appendix=["inputs"])
+    (part,) = (section for section in told.sections if section.title == "Conditions")
+    found = {str(row[0]): str(row[1]) for table in part.blocks if isinstance(table, Table) for row in table.rows}
+    assert found["Mass, every pendulum"] == "0.5 kg"
+    assert (found["Spring rate, pendulum 1"], found["Spring rate, pendulum 2"]) == ("9 N/mm", "18 N/mm")
+    assert not {"Mass, pendulum 1", "Mass, pendulum 2", "Spring rate, every pendulum"} & set(found)
+    common = sum("every pendulum" in caption for caption in found)
+    (rest,) = (str(block.text) for block in part.blocks if isinstance(block, Text))
+    (appendix,) = (section for section in told.sections if section.title == "Inputs")
+    every = [row for table in appendix.blocks if isinstance(table, Table) for row in table.rows]
+    inputs_of_machine = [row for row in every if not str(row[0]).startswith("Run:")]
+    assert int(rest.split()[0]) == len(inputs_of_machine) - len(found) - common

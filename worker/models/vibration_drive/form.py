@@ -46,7 +46,7 @@ _CLUTCH: Final = FormChoice(
     ),
 )  # fmt: skip
 _WHOSE: Final = FormChoice(
-    "clutches", "Whose clutch", control="radio",
+    "clutches", "Whose clutch", control="radio", several="pendulums",
     options=(
         Option("common", "One law for all pendulums", (_CLUTCH,)),
         Option("own", "One law for each pendulum", at="pendulums/0/clutch"),
@@ -55,6 +55,15 @@ _WHOSE: Final = FormChoice(
 
 #: What the maker of a clutch says of it.
 _RATINGS: Final = ("rated_torque", "rated_frequency", "rated_speed", "fatigue_exponent")
+
+#: How a pendulum and its clutch start.
+_START: Final = ("initial_angle", "initial_speed", "initial_windup", "initial_clutch")
+#: Loads of the shaft beside the constant one, and what its bearings are asked about.
+_LOADS: Final = (
+    "linear_load", "quadratic_load", "stribeck_load", "stribeck_speed", "cyclic_load", "load_cycles", "load_phase",
+)  # fmt: skip
+_FACTOR: Final = FormField("shaft/load_factor")
+_BEARINGS: Final = ("bearing_damping", "bearing_rating", "bearing_exponent", "bearing_share", "rotor_mass")
 
 #: A load that is given as a table.
 _LOAD: Final = FormField(
@@ -102,17 +111,28 @@ _FURTHER: Final = FormChoice(
 
 FORM: Final = Form(
     parts=(
-        Block("Vibration of the base", (FormField("excitation/*"), _FURTHER)),
+        Block("Vibration of the base", (FormField("excitation/*"),)),
+        Block("Further motion of the base", (_FURTHER, FormField("excitation/harmonic_factor")), within=True),
         Rows(
             "pendulums", "pendulums", 1, MAX_PENDULUMS, "Pendulum {number}", "Add a pendulum", "Remove the last one",
             blocks=(
                 Block("", (FormField("*"),)),
                 Block("Its clutch", (_CLUTCH,), within=True, only=("clutches", "own")),
+                Block(
+                    "Losses and ratings of its freewheel",
+                    tuple(map(FormField, ("clutch_damping", "overrunning_damping", *_RATINGS))), within=True,
+                ),
+                Block("Its motion at the start", tuple(map(FormField, _START)), within=True),
             ),
             only_last=True, shared=("clutches", "clutch"), every="every pendulum", one="pendulum {number}",
         ),
         Block("Freewheel clutch", (_WHOSE,)),
-        Block("Output shaft", (FormField("shaft/*"), _LOAD)),
+        Block("Output shaft", (FormField("shaft/*"),)),
+        Block(
+            "Load that depends on speed or angle", (*(FormField(f"shaft/{name}") for name in _LOADS), _LOAD, _FACTOR),
+            within=True,
+        ),
+        Block("Bearings", tuple(FormField(f"shaft/{name}") for name in _BEARINGS), within=True),
         Block("Surroundings", (FormField("*"),)),
     ),
     components=(

@@ -43,6 +43,7 @@ class Entry:
     shape : whether it decides about other fields
     tolerant : whether drives can differ in it: it is a number of the machine
     groups : of a switch, the fields of each of its options
+    unseen : whether the page leaves it out, as it decides nothing
     """
 
     field: Field
@@ -51,6 +52,7 @@ class Entry:
     shape: bool = False
     tolerant: bool = False
     groups: tuple[tuple[str, tuple[Entry, ...]], ...] = ()
+    unseen: bool = False
 
     @property
     def name(self) -> str:
@@ -174,22 +176,26 @@ class _Machine:
     model: str = field(init=False)
     form: data.Form = field(init=False)
     deciding: frozenset[str] = field(init=False)
+    named: frozenset[str] = field(init=False)
     chosen: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.model, self.form = model_name(self.values), form_of(self.values)
-        fields = (item for part in self.form.parts for item in _items(part))
+        fields = [item for part in self.form.parts for item in _items(part)]
         self.deciding = frozenset(hidden.by for item in fields for hidden in item.hidden)
+        self.named = frozenset(item.name for item in fields)
 
     def blocks(self) -> Iterator[Block]:
+        made: list[Block] = []
         for part in (*self.form.parts, *_others(self.model, self.form)):
-            if isinstance(part, data.Block):
-                yield self._block(part, BASE)
+            if isinstance(part, data.Rows):
+                rows = list(self._rows(part))
+                made += [*rows[:-1], *(replace(last, ends=part.name) for last in rows[-1:])]
+            elif part.within:
+                made[-1] = _continued(made[-1], self._block(part, BASE))
             else:
-                *before, last = [None, *self._rows(part)]
-                yield from filter(None, before)
-                if last is not None:
-                    yield replace(last, ends=part.name)
+                made.append(self._block(part, BASE))
+        yield from made
 
     def _rows(self, rows: data.Rows) -> Iterator[Block]:
         count = rows_of(self.values, rows)
@@ -202,7 +208,7 @@ class _Machine:
                     own = replace(own, part=place if rows.alone else "", heading=block.title)
                     title = _(rows.title, number=index + 1, label=_(block.title).lower())
                     if block.within:
-                        made[-1] = replace(made[-1], within=(*made[-1].within, own))
+                        made[-1] = _continued(made[-1], own)
                     else:
                         drop = None if made or rows.only_last else (rows.name, index)
                         made.append(replace(own, title=title, drop=drop))
@@ -222,7 +228,8 @@ class _Machine:
                     yield self._field(item, place)
             else:
                 for name in _numbers(self.model, f"{place}/{item.name}".removeprefix(f"{BASE}/")[:-1]):
-                    if not self._is_hidden(item, place, name):
+                    named = item.name[:-1] + name in self.named
+                    if not named and not self._is_hidden(item, place, name):
                         yield self._field(replace(item, name=item.name[:-1] + name), place)
 
     def _choice(self, item: data.FormChoice, place: str) -> Iterator[Entry]:
@@ -234,7 +241,8 @@ class _Machine:
             groups = tuple((option.value, tuple(self._entries(option.items, place))) for option in item.options)
             yield replace(entry, groups=groups)
             return
-        yield entry
+        plain = item.several and option == item.options[0] and count_in(self.values, item.several, 1, 1, 2) == 1
+        yield replace(entry, unseen=bool(plain))
         yield from self._entries(option.items, place)
 
     def _is_hidden(self, item: data.FormField, place: str, number: str) -> bool:
@@ -263,6 +271,10 @@ class _Machine:
         if own.choices:
             self.chosen[name] = made.chosen(self.values)
         return made
+
+
+def _continued(block: Block, inner: Block) -> Block:
+    return replace(block, within=(*block.within, inner))
 
 
 def _items(part: data.Block | data.Rows) -> Iterator[data.FormField]:

@@ -163,7 +163,8 @@ class Sheet:
     """The sheet of a filled form.
 
     ``spots`` are all numbers by the name of their field, ``placed`` those beside a drawing, ``front`` those of fields
-    that are always in sight; ``opened`` is whether something in the drawer differs or is wrong.
+    that are always in sight; ``opened`` is whether something in the drawer differs or is wrong, ``filled`` are the
+    fields with a text, an axis, a difference from the study they began with, or a fault.
     """
 
     plans: tuple[Plan, ...]
@@ -175,6 +176,7 @@ class Sheet:
     rows: tuple[Row, ...]
     ticks: str
     opened: bool
+    filled: frozenset[str]
 
     def drawn(self, block: Block | None = None) -> tuple[Plan, ...]:
         """The drawings of a block, or those of the whole machine."""
@@ -195,10 +197,16 @@ class Sheet:
         """The values of what varies in words, by the name of its field."""
         return {name: spot.span for name, spot in self.spots.items() if spot.row is not None}
 
+    def opens(self, block: Block) -> bool:
+        """Whether a block within another one is open, as something in it is filled in or wrong."""
+        return any(
+            entry.name in self.filled and not isinstance(entry.item, FormChoice) for entry in _all(block.entries)
+        )
+
     def shown(self, block: Block, *, front: bool) -> tuple[Entry, ...]:
         """The fields of a block in sight, or in the drawer."""
-        return tuple(entry for entry in block.entries if
-                     (entry.name in self.front) == front and entry.name not in self.placed)  # fmt: skip
+        seen = (entry for entry in block.entries if not entry.unseen and entry.name not in self.placed)
+        return tuple(entry for entry in seen if (entry.name in self.front) == front)
 
 
 def sheet_of(
@@ -258,6 +266,8 @@ def sheet_of(
     return Sheet(
         tuple(plans), tuple(every), groups, spots, placed, front, tuple(made.rows()),
         " ".join(spot.path for spot in spots.values() if spot.may_vary), opened,
+        faulty | {name for name, text in values.items() if text.strip()}
+        | {name for name, spot in spots.items() if spot.row is not None or spot.was is not None},
     )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from sprag_study.service.http.web.form.entries import (
@@ -192,11 +192,12 @@ def _start_fields(item: Mapping[str, Any]) -> Values:
 
 
 def _until(form: Filled) -> dict[str, Any]:
-    texts = [form.text(name) for name in ("duration", *_WINDOW.fields)]
-    given = {"duration": plain(texts[0])} if texts[0] else {}
     if form.text("until", SETTLED) == SETTLED:
-        return {"until": SETTLED, **given}
-    return given if any(texts) else {"duration": time_text(TIMED_DEFAULTS["duration"])}
+        return {"until": SETTLED}
+    texts = [form.text(name) for name in ("duration", *_WINDOW.fields)]
+    if not any(texts):
+        return {"duration": time_text(TIMED_DEFAULTS["duration"])}
+    return {"duration": plain(texts[0])} if texts[0] else {}
 
 
 def _window(form: Filled) -> dict[str, Any]:
@@ -492,8 +493,14 @@ PARTS: Final = {
     )
 }  # fmt: skip
 _SAMPLE: Final = Record((*described(SAMPLE.described.values()), PARTS["ranges"]), whole="/count")
-_TIMES: Final = [entry for entry in (*SETTLED_RUN.values(), *ANY_RUN.values()) if entry.name != "until"]
-_RUN: Final = Record((_UNTIL, _WINDOW, *described(_TIMES)), key="run", when=lambda values: form_of(values).with_run)
+_UNTIL_SETTLED: Final = described(entry for entry in SETTLED_RUN.values() if entry.name != "until")
+_ANY_RUN: Final = described(ANY_RUN.values())
+_RUN: Final = Record(
+    (_UNTIL, _WINDOW, *_UNTIL_SETTLED, *_ANY_RUN), key="run", when=lambda values: form_of(values).with_run
+)
+#: The fields of a run that is chosen: those of the other one are out of sight and keep their texts.
+_SETTLED_RUN: Final = replace(_RUN, members=(_UNTIL, *_UNTIL_SETTLED, *_ANY_RUN))
+_TIMED_RUN: Final = replace(_RUN, members=(_UNTIL, _WINDOW, *_ANY_RUN))
 _SHAFT_RUN: Final = Record(
     tuple(described(SHAFT_RUN.values())), key="run", when=lambda values: form_of(values).with_loads
 )
@@ -504,7 +511,8 @@ class _Run:
 
     def entries(self, form: Filled) -> dict[str, Any]:
         """As of a `Member`; no run where a machine shaft has nothing to say of it."""
-        found = _RUN.entries(form) or _SHAFT_RUN.entries(form)
+        settled = form.values.get("/run/until", SETTLED) == SETTLED
+        found = (_SETTLED_RUN if settled else _TIMED_RUN).entries(form) or _SHAFT_RUN.entries(form)
         return found if found.get("run") else {}
 
     def show(self, item: Mapping[str, Any], form: Filled) -> set[str]:

@@ -44,7 +44,8 @@ def test_the_focus_stays_where_somebody_works_on_the_form(visitor: Visitor) -> N
     page.locator("#drawer > summary").press("Enter")
     page.locator('button[value="add-axes"]').press("Enter")
     expect(page.locator(":focus")).to_have_attribute("id", "/axes/0/path")
+    page.locator('button[value="add-pendulums"]').press("Enter")
     page.locator('[name="/base/clutches"]:checked').press("ArrowDown")
-    expect(page.locator("h3", has_text="Its clutch").first).to_be_visible()
+    expect(page.locator("summary", has_text="Its clutch").first).to_be_visible()
     expect(page.locator(":focus")).to_have_attribute("value", "own")
     assert page.evaluate(UNSEEN) == ""
