@@ -30,6 +30,6 @@ def test_threads_that_ask_at_the_same_time_get_one_table(monkeypatch: pytest.Mon
 
     infos = Infos(models.result_infos("vibration-drive", "1"))
     with ThreadPoolExecutor(2) as threads:
-        first, second = threads.map(lambda _: tables._table_of_rows("rows", infos), range(2))
+        first, second = threads.map(lambda _: tables._Rows("rows", infos).table(), range(2))
     assert first is second
     assert list(tables.METADATA.tables) == ["rows"]

@@ -103,7 +103,7 @@ _FURTHER: Final = FormChoice(
             FormField(
                 "excitation/measured/accuracy", "number", "Accuracy of the reduction",
                 "rms residual at which the reduction to harmonics ends, as a share of the amplitude",
-                range="> 0 and <= 1", default="1 %", example="1 %", unit="1",
+                range="> 0, <= 1", default="1 %", example="1 %", unit="1",
             ),
         ), at="excitation/measured/csv"),
     ),
