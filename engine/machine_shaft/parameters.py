@@ -150,7 +150,10 @@ MECHANISM_PARAMETERS: Mapping[MechanismKind, tuple[Parameter, ...]] = {
         _cam_angle("mechanism.cam.fall_angle", "beta_3", "angle of the fall", None, True),
         _mass("mechanism.cam.follower_mass", "m", "mass of the follower"),
         Parameter("mechanism.cam.spring_rate", "c", "N/m", 0.0, 1e12, False, 0.0, "rate of the follower's spring"),
-        Parameter("mechanism.cam.spring_preload", "F_0", "N", 0.0, 1e12, False, 0.0, "its force at no lift"),
+        Parameter(
+            "mechanism.cam.spring_preload", "F_0", "N", 0.0, 1e12, False, 0.0,
+            "force of the follower's spring at no lift",
+        ),
         _inclination("mechanism.cam"),
     ),
 }  # fmt: skip

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sprag_study.sentences import Amount, Place, Sentence
+from sprag_study.sentences import Amount, Name, Place, Sentence
 from sprag_study.service.spec.axes.axes import varied_values
 from sprag_study.service.spec.fields import base_pointer
 from sprag_study.service.spec.report import Report
@@ -64,15 +64,16 @@ def warn_vibration_drive(report: Report, study: Study) -> None:
         report.warn("slow-excitation", _place(study, "excitation.frequency"), slow)
     for path, needed in _ONLY_WITH.items():
         if _values(study, path).any() and needed not in study.column_paths and not study.base.get(needed, 0.0):
-            report.warn("no-effect", _place(study, path), Sentence("has no effect: {path} is 0", path=needed))
+            report.warn(
+                "no-effect", _place(study, path), Sentence("has no effect: {path} is 0", path=Name(needed, within=True))
+            )
     if LOAD_FACTOR in (*study.base, *study.column_paths) and f"{LOAD_TABLE}0.speed" not in study.base:
         report.warn(
             "no-effect", _place(study, LOAD_FACTOR), Sentence("has no effect: the load is not given as a table")
         )
-    amplitudes = [f"amplitude_{axis}" for axis in "xy" if _values(study, f"excitation.amplitude_{axis}").any()]
-    if report.written(_MEASURED) is not None and amplitudes:
-        text = Sentence("has {names} added to it", names=", ".join(amplitudes))
-        report.warn("added-vibration", _MEASURED, text)
+    for path in (f"excitation.amplitude_{axis}" for axis in "xy"):
+        if report.written(_MEASURED) is not None and _values(study, path).any():
+            report.warn("added-vibration", _place(study, path), Sentence("is added to the measured motion"))
     if HARMONIC_FACTOR in (*study.base, *study.column_paths) and f"{HARMONICS}0.order" not in study.base:
         report.warn(
             "no-effect", _place(study, HARMONIC_FACTOR), Sentence("has no effect: the vibration has no harmonics")

@@ -57,6 +57,13 @@ def of_drives() -> Iterator[str]:
         {"/axes": [{"path": "excitation.amplitude_x", "values": [1.6, 0.001]}]},
         {"/axes": [], "/base/pendulums/0/inertia": "4e-4 kg*m^2", "/base/pendulums/0/spring_rate": 40},
         {"/axes": [], "/base/clutch": {"coefficients": [0.5, 200]}},
+        {
+            "/axes": [],
+            "/base/excitation/measured": {
+                "csv": "angle [deg],x [mm]\n" + "".join(f"{45 * row},{abs(row - 4)}\n" for row in range(8)),
+                "accuracy": "20 %",
+            },
+        },
         {"/axes": [], "/base/clutch": {"coefficients": [0, 200, -1000], "windup_limit": "0.15 rad"}},
         {"/axes": [{"path": "shaft.load", "linspace": [0, 1, 40_000]}], "/run": {}, "/starts": _starts(32)},
         {"/axes": [{"path": "shaft.load", "values": [1, 2, 0.5]}]},

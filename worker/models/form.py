@@ -190,7 +190,6 @@ class Form:
     normal : what is said about a batch of machines that differ
     advice : what is said about axes
     groups : beginning of paths -> heading under which they are offered as axes; by default their first parts
-    nameless : pattern of the beginning of paths that the labels of axes leave out
     labels : path of the catalogue -> label of its axis, with {part} and {number}
     """
 
@@ -209,7 +208,6 @@ class Form:
     )
     advice: str = ""
     groups: tuple[tuple[str, str], ...] = ()
-    nameless: str = ""
     labels: Mapping[str, str] = field(default_factory=dict)
 
     def example(self, name: str) -> str:

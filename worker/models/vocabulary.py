@@ -13,6 +13,8 @@ from sprag_study.worker.models.registry import model_of
 from sprag_study.worker.spread import DRIVE
 
 _HALF_WIDTH: Final = ".half_width"
+#: Path of the constants that users name, with a caption of their names.
+_CONSTANT: Final = "constants.NAME"
 #: Caption of the half width of a mean.
 HALF_WIDTH: Final = "{caption}, half width"
 #: What a numbered part is called, by the first words of its paths.
@@ -109,12 +111,14 @@ def _caption(model: str, name: str) -> tuple[str, str, tuple[str, str] | None]:
     own, part = _within_part(name)
     captions = model_of(model).presentation.captions
     general = general_path(name)
+    if (constant := name.removeprefix("constants.")) != name and _CONSTANT in captions:
+        return captions[_CONSTANT], constant, None
     found = next((captions[key] for key in (name, general, general_path(own)) if key in captions), None)
     if found is not None:
         index = re.findall(r"\.(\d+)", name)
         return found, index[-1] if index else "", part
     entry = model_parameter(model, name)
-    if entry is None or name.startswith("constants."):
+    if entry is None:
         return _without_places(words(own if part else name)), "", part
     text = _END.split(entry.help, maxsplit=1)[0].strip()
     return _without_places(text[:1].upper() + text[1:]), "", part

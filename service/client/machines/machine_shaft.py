@@ -346,7 +346,7 @@ class ShaftMechanismCam(TypedDict, total=False):
     fall_angle : Angle of the fall (beta_3), rad; > 0 rad and <= 6.28319 rad.
     follower_mass : Mass of the follower (m), kg; >= 0 kg and <= 1e+09 kg.
     spring_rate : Rate of the follower's spring (c), N/m; >= 0 N/m and <= 1e+12 N/m.
-    spring_preload : Its force at no lift (F_0), N; >= 0 N and <= 1e+12 N.
+    spring_preload : Force of the follower's spring at no lift (F_0), N; >= 0 N and <= 1e+12 N.
     inclination : Rise of the forward stroke above the level (beta), rad; >= -6.28319 rad and <= 6.28319 rad.
     """
 

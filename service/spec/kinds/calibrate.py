@@ -137,7 +137,7 @@ def _read_plan(
         text.refuse(
             "out-of-range", plural("has {count} measured value", "has {count} measured values", count), count,
             allowed=Sentence(
-                "{low} to {high}: more values than unknown parameters", low=str(least), high=MOST_MEASURED
+                "{low} to {high}: more values than numbers to fit", low=str(least), high=MOST_MEASURED
             ),
         )  # fmt: skip
         return None

@@ -44,7 +44,7 @@ from tests.service import warning_samples
 DRIVE = Reading("vibration-drive", Units({"N*m": "N*mm", "m": "mm", "rad": "deg"}))
 SHAFT = Reading("machine-shaft", Units({"Pa": "bar", "m": "mm"}))
 #: Names that are the same in every language, and what a user typed.
-KEPT = re.compile(r"SPRAG_CHUNK_TIMEOUT|T_mean|Sprag|«[^»]*»")
+KEPT = re.compile(r"SPRAG_CHUNK_TIMEOUT|CSV|T_mean|Sprag|«[^»]*»")
 PLACED = Sentence(
     "{value} is more than {limit}; {question}",
     value=Amount(1.6, "m", 6),

@@ -243,5 +243,4 @@ FORM: Final = Form(
         ("drive.flywheel.", "Flywheel"), ("drive.motor.", "Motor"), ("drive.stages.", "Stages"), ("drive.", "Drive"),
         ("mechanism.", "Mechanism"), ("operation.", "Operation"), ("constants.", "Constants"), ("", "Machine"),
     ),
-    nameless=r"(parts\.\d+\.)?((mechanism\.linkage\.elements|mechanism\.\w+|operation(\.gas|\.indicator)?|drive|constants)\.)?",
 )  # fmt: skip

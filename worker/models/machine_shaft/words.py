@@ -63,7 +63,7 @@ CAPTIONS: Final[dict[str, str]] = {
     "mechanism.linkage.elements.K.mass": "Mass of element {number}",
     "mechanism.linkage.elements.K.inertia": "Inertia of element {number}",
     "mechanism.linkage.elements.K.block_mass": "Mass of the block of element {number}",
-    "constants.NAME": "Constant",
+    "constants.NAME": "Constant {0}",
     "omega.mean": "Mean speed of the shaft",
     "omega.max": "Largest speed",
     "omega.min": "Smallest speed",

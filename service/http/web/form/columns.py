@@ -14,6 +14,7 @@ from sprag_study.service.http.web.form.spec import PARTS
 from sprag_study.service.languages import ENGLISH, current, gettext
 from sprag_study.service.reading.numbers import WITHOUT_DOUBT, is_ambiguous, parse_number, question, settled
 from sprag_study.service.reading.texts import did_you_mean
+from sprag_study.service.reading.wording import words
 from sprag_study.service.spec.table_text import settled_table, with_units
 from sprag_study.service.table_rows import MAX_HEADING, heading_of, split
 
@@ -127,7 +128,10 @@ def _named(heading: str, choices: Groups) -> tuple[str, str, str]:
         )
         return "", "", message
     known: Mapping[str, str] = {
-        name.lower(): choice.path for _, group in choices for choice in group for name in (choice.path, choice.label)
+        name.lower(): choice.path
+        for _, group in choices
+        for choice in group
+        for name in (words(choice.path), choice.path, choice.label)
     }
     name, unit = heading_of(heading) or ("", "")
     if name.lower() in known:

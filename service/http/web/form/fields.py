@@ -7,11 +7,10 @@ field.
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
-from sprag_study.service.languages import ENGLISH, N_, _, current
+from sprag_study.service.languages import N_, _
 from sprag_study.service.reading.reader import Reading
 from sprag_study.service.reading.units import examples
 from sprag_study.service.reading.wording import number, words
@@ -28,8 +27,6 @@ if TYPE_CHECKING:
 
 #: The model that the form describes unless another is chosen.
 FORM_MODEL: Final = "vibration-drive"
-#: The path of a number of one of several parts of a list.
-_OF_A_LIST: Final = re.compile(r"\.\d+\.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,15 +156,6 @@ def result_choices(reading: Reading, rows: Callable[[str], int], *, numbers: boo
                 choice = Choice(name, reading.caption(name), reading.unit(entry.unit))
                 groups.setdefault(_(group), []).append(choice)
     return list(groups.items())
-
-
-def label_of(name: str, model: str, path: str = "") -> str:
-    """What a list of parameters or results calls one; headings of pasted columns are these in English, or paths.
-
-    ``path`` is the whole path of one whose English label has less; one of a list of parts has its caption.
-    """
-    plain = current() == ENGLISH and not _OF_A_LIST.search(name)
-    return words(name) if plain else Reading(model).caption(path or name)
 
 
 def categories(model: str) -> tuple[str, ...]:

@@ -13,9 +13,9 @@ from functools import lru_cache
 from typing import Any, Final, Literal
 
 from sprag_study.service.http.web.form.entries import count_in
-from sprag_study.service.http.web.form.fields import FORM_MODEL, Choice, Field, Groups, described, field_for, label_of
+from sprag_study.service.http.web.form.fields import FORM_MODEL, Choice, Field, Groups, described, field_for
 from sprag_study.service.languages import _, current
-from sprag_study.service.reading.reader import part_label, shown
+from sprag_study.service.reading.reader import Reading, part_label, shown
 from sprag_study.service.reading.wording import words
 from sprag_study.service.spec.described import Described, below
 from sprag_study.service.spec.fields import base_path
@@ -340,10 +340,8 @@ def choices_of(values: Mapping[str, str], base: Mapping[str, Any]) -> Groups:
     groups: dict[str, list[Choice]] = {}
     for path, entry in part_of(model).read_base(Node(Report(), BASE, base)).parameters.items():
         group, known = group_of(model, path), form.labels.get(_general(path))
-        if known:
-            label = _(known, part=group, number=int(path.rpartition(".")[2]) + 1)
-        else:
-            label = label_of(re.sub(form.nameless, "", path, count=1), model, path)
+        number = int(path.rpartition(".")[2]) + 1 if known else 0
+        label = _(known, part=group, number=number) if known else Reading(model).caption(path)
         groups.setdefault(group, []).append(Choice(path, label, entry.unit))
     return list(groups.items())
 

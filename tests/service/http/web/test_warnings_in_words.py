@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 #: A sentence of each code, as earlier versions stored it, about places of every part of a spec.
 DRIVE: dict[WarningCode, str] = {
+    "added-vibration": "/base/excitation/amplitude_y: is added to the measured motion",
     "ambiguous-point": "/points: line 3: `20.000` is taken as 20, with a decimal point",
     "angular-frequency": "/derive (excitation.frequency): a root of this kind is an angular frequency in rad/s",
     "assumed-units": "/base/clutch/data: the file does not name every unit: angles are taken in rad",
@@ -48,6 +49,7 @@ DRIVE: dict[WarningCode, str] = {
     "no-effect": "/axes/0 (excitation.amplitude_x = excitation.amplitude_y): was varied, but changes no result",
     "not-monotonic": "/axes/0/values (shaft.load): the values rise at first, but 0.2 N*m stands after 100 N*m",
     "nothing-moves": "/base/excitation: both amplitudes are 0, so the base does not move",
+    "reduced-motion": "/base/excitation/measured: 2 harmonics stand for the measured motion",
     "rows-in-backlash": "/base/clutch: 2 of 9 rows lie within the backlash and were left out of the fit",
     "short-search": "/run/at_most: 100 periods are too few for the means of irregular motion, which takes 400",
     "short-window": "/run/window: shorter than one excitation period at 25 Hz (0.5 periods)",
