@@ -260,7 +260,7 @@ def sheet_of(
     inside = {entry.name for entry in found} - front
     opened = (
         any(name in inside for name in faulty)
-        or _differs(values, begun, (entry for entry in found if entry.name in inside))
+        or _differs(values, begun, (entry for entry in found if entry.name in inside and not entry.unseen))
         or any(values.get(name) != text for name, text in (begun or {}).items() if name.startswith("/run/"))
     )
     return Sheet(
