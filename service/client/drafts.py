@@ -178,6 +178,27 @@ def refined_results(results: Results) -> list[Any]:
     return [results] if isinstance(results, str) else list(results)
 
 
+def sensors_of(sensors: Results | None) -> list[Any] | None:
+    """The objects of a spec about sensors.
+
+    A mapping has the gain and the offset of each result, in which two values in parentheses are the ends of a range.
+    """
+    if sensors is None:
+        return None
+    if isinstance(sensors, str):
+        raise ArgumentError("sensors", sensors, "a mapping such as {'torque.mean': {'gain': 1.02}}")
+    if not isinstance(sensors, Mapping):
+        return list(sensors)
+    listed = []
+    for name, factors in sensors.items():
+        if not isinstance(factors, Mapping):
+            raise ArgumentError(name, factors, "a mapping such as {'gain': 1.02, 'offset': ('-1 N*m', '1 N*m')}")
+        ends = {key: {"from": value[0], "to": value[1]} for key, value in factors.items()
+                if isinstance(value, tuple) and len(value) == 2}  # fmt: skip
+        listed.append({"result": name, **factors, **ends})
+    return listed
+
+
 def _result(name: str, wanted: Any) -> dict[str, Any]:
     if isinstance(wanted, Mapping):
         return {"result": name, **wanted}

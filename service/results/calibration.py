@@ -93,6 +93,11 @@ class Calibration:
         return sentences(self)
 
     @property
+    def doubts(self) -> list[str]:
+        """Those of the sentences about the fit and the measurement."""
+        return [] if self.answer is None else list(_doubts(self, self.answer))
+
+    @property
     def names(self) -> list[str]:
         """Names of what is fitted: the unknown parameters, then gains and offsets of sensors."""
         return [one.paths[0] for one in self.plan.fitted]
@@ -352,15 +357,21 @@ def sentences(found: Calibration) -> list[str]:
     if known is None:
         return []
     return [
-        *_fits(found),
-        *_scatter(found, known),
-        *_shifted(found, known),
+        *_doubts(found, known),
+        *_deviations(found, known),
         *(_undetermined(found, one) for one in known.directions),
         *_bounds(found, known),
-        *_points(found, known),
         *_refits(found, known),
         *_next_point(found, known),
     ]
+
+
+def _doubts(found: Calibration, known: Answer) -> Iterator[str]:
+    """Whether the model fits, and what in the measurement may be wrong."""
+    yield from _fits(found)
+    yield from _chi_square(found, known)
+    yield from _shifted(found, known)
+    yield from _points(found, known)
 
 
 def _fits(found: Calibration) -> Iterator[Phrase]:
@@ -424,7 +435,8 @@ def _shifted(found: Calibration, known: Answer) -> Iterator[Phrase]:
         )
 
 
-def _scatter(found: Calibration, known: Answer) -> Iterator[Phrase]:
+def _deviations(found: Calibration, known: Answer) -> Iterator[Phrase]:
+    """The standard deviations that follow from the residuals."""
     plan = found.plan
     _, columns = plan.places
     for column, one in enumerate(plan.measured):
@@ -435,6 +447,11 @@ def _scatter(found: Calibration, known: Answer) -> Iterator[Phrase]:
                 name=Name(one.result, within=True),
                 sigma=Amount(sigma, found.infos[one.result].unit, 4, form=".4g"),
             )
+
+
+def _chi_square(found: Calibration, known: Answer) -> Iterator[Phrase]:
+    """Whether the residuals are as large as given standard deviations say."""
+    plan = found.plan
     if not plan.known_sigma or known.freedom < 1:
         return
     values: dict[str, Part] = {"value": Amount(known.chi_square, "1", 3, form=".3g"), "freedom": known.freedom}

@@ -9,7 +9,16 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal, Self
 
 from sprag_study.service.client.case_tables import measured_of
-from sprag_study.service.client.drafts import Draft, Entries, Quantity, Results, known, refined_results, results_of
+from sprag_study.service.client.drafts import (
+    Draft,
+    Entries,
+    Quantity,
+    Results,
+    known,
+    refined_results,
+    results_of,
+    sensors_of,
+)
 
 
 class Studies(Draft):
@@ -142,7 +151,7 @@ class Studies(Draft):
             calibrate=known(
                 unknown=self._entries(unknown, "values"),
                 measured=measured_of(measured),
-                sensors=results_of(sensors),
+                sensors=sensors_of(sensors),
                 loss=loss,
                 refits=refits,
                 seed=seed,

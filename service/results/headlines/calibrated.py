@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from sprag_study.sentences import Amount
 from sprag_study.service.reading.reader import Phrase, joined, plural
@@ -10,6 +10,9 @@ from sprag_study.service.results.headlines.headline import MOST, NOTHING, Headli
 
 if TYPE_CHECKING:
     from sprag_study.service.results.calibration import Calibration
+
+#: Sentences about the fit and the measurement at most: whether it fits, an offset, a value far off.
+_DOUBTS: Final = 3
 
 
 def calibrated_headline(found: Calibration) -> Headline:
@@ -33,8 +36,8 @@ def calibrated_headline(found: Calibration) -> Headline:
         "{values}: that explains the {count} measured values best.",
         count, values=values,
     )  # fmt: skip
-    doubts = found.sentences
-    return Headline((fits, *(joined("", [one]) for one in doubts[:1])), every[:MOST], every[MOST:] and every)
+    doubts = (joined("", [one]) for one in found.doubts[:_DOUBTS])
+    return Headline((fits, *doubts), every[:MOST], every[MOST:] and every)
 
 
 def _parameter(found: Calibration, place: int) -> KeyNumber:

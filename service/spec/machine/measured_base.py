@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from sprag_study.sentences import Amount, Sentence, plural
+from sprag_study.service.languages import N_
 from sprag_study.service.reading.catalogue import range_sentence
 from sprag_study.service.reading.units import QuantityError, parse_exact, split_quantity
 from sprag_study.service.spec.described import Listed, Record
@@ -30,22 +32,24 @@ _TURN: Final = 2.0 * math.pi
 _FEWEST: Final = 8
 #: Share of the period by which rounded times may exceed it.
 _ROUNDED: Final = 1e-6
+#: Cyrillic letters that look like x and y.
+_LATIN: Final = str.maketrans("\N{CYRILLIC SMALL LETTER HA}\N{CYRILLIC SMALL LETTER U}", "xy")
 #: The end of the period may be this many times the widest gap between rows behind the last row.
 _WIDER: Final = 1.5
-_ANGLE: Final = Parameter("angle", "", "rad", -1e3, 1e3, False, None, "angle of a row")
-_TIME: Final = Parameter("time", "", "s", -1e6, 1e6, False, None, "time of a row")
+_ANGLE: Final = Parameter("angle", "", "rad", -1e3, 1e3, False, None, N_("angle of a row"))
+_TIME: Final = Parameter("time", "", "s", -1e6, 1e6, False, None, N_("time of a row"))
 _DISPLACEMENTS: Final = tuple(
-    Parameter(axis, "", "m", -10.0, 10.0, False, None, "displacement of the base") for axis in "xy"
+    Parameter(axis, "", "m", -10.0, 10.0, False, None, N_("displacement of the base")) for axis in "xy"
 )
 _ACCELERATIONS: Final = tuple(
-    Parameter(axis, "", "m/s^2", -1e6, 1e6, False, None, "acceleration of the base") for axis in "xy"
+    Parameter(axis, "", "m/s^2", -1e6, 1e6, False, None, N_("acceleration of the base")) for axis in "xy"
 )
 _PERIOD: Final = Parameter(
-    "period", "", "s", 0.0, 1e6, True, None, "period of the measured motion, of rows with times or accelerations"
+    "period", "", "s", 0.0, 1e6, True, None, N_("period of the measured motion, of rows with times or accelerations")
 )
 _ACCURACY: Final = Parameter(
     "accuracy", "", "1", 0.0, 1.0, True, 0.01,
-    "rms residual at which the reduction to harmonics ends, as a share of the amplitude",
+    N_("rms residual at which the reduction to harmonics ends, as a share of the amplitude"),
 )  # fmt: skip
 _ROWS: Final = Listed(
     "rows", _FEWEST, machine_shaft.MAX_ROWS, "rows of angle (rad), x and y (m); or of time (s), of accelerations "
@@ -83,9 +87,9 @@ def read_measured_base(node: Node) -> list[list[float]]:
     period: float | None = math.nan
     if timed or accelerated:
         period = node["period"].number_or_default(_PERIOD)
-    elif node["period"].given:
+    elif sound and node["period"].given:
         node["period"].refuse("not-used", "is not used: the rows have angles and displacements")
-    if not sound or period is None or accuracy is None:
+    if not sound or period is None or accuracy is None or (form == "csv" and not _is_named(data, columns)):
         return []
     table = np.array(rows)
     if not _is_one_period(data, table[:, 0], over, period if timed else _TURN):
@@ -117,10 +121,29 @@ def _columns(node: Node) -> list[Parameter]:
         return next((way for way, unit in units if unit and _fits(f"1 {unit}", way)), None) or _of_cells(cells, *ways)
 
     over = of_unit(0, _ANGLE, _TIME)
-    named = [name[:1].lower() for name, _ in headings[1:]]
+    named = _axes_of(headings)
     axes = ["xy".index(name) for name in named] if named in (["x"], ["y"], ["y", "x"]) else [0, 1]
     kind = max((of_unit(place, *_kinds(0)) is _ACCELERATIONS[0] for place in range(1, len(axes) + 1)), default=False)
     return [over, *(_kinds(axis)[kind] for axis in axes)]
+
+
+def _axes_of(headings: list[tuple[str, str]]) -> list[str]:
+    """What the headings behind the first one call their columns: x, y, or another name."""
+    names = [name.lower().translate(_LATIN) for name, _unit in headings[1:]]
+    return [found[0] if (found := re.match(r"[xy](?![^\W_])", name)) else name for name in names]
+
+
+def _is_named(node: Node, columns: list[Parameter]) -> bool:
+    """Whether no heading of a CSV text names another axis than its column is; otherwise a fault says so."""
+    headings = [heading_of(cell) or ("", "") for cell in split(node.value).rows[0].cells]
+    named = _axes_of(headings)
+    if set(named) & {"x", "y"} and named != [column.path for column in columns[1:]]:
+        node.refuse(
+            "invalid-table", Sentence("has the headings {names}", names=", ".join(name for name, _ in headings)), None,
+            allowed=Sentence("x and y, or one of them, behind the first column"),
+        )  # fmt: skip
+        return False
+    return True
 
 
 def _columns_of_rows(node: Node) -> list[Parameter]:
@@ -181,6 +204,12 @@ def _is_one_period(node: Node, over: NDArray[np.float64], column: Parameter, per
     )  # fmt: skip
     if missing < -_ROUNDED * period:
         lasts = {"period": amount(period), "last": amount(last)}
+        if column is _ANGLE:
+            longer = Sentence(
+                "is longer than its period of {period}: the last row is at {last}; angles without a unit are in rad",
+                **lasts,
+            )
+            return refuse(longer, whole)
         return refuse(Sentence("is longer than its period of {period}: the last row is at {last}", **lasts), whole)
     if missing > _WIDER * widest:
         ends = {"last": amount(last), "missing": amount(missing)}

@@ -33,7 +33,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal, Self, TypedDict
 
 from sprag_study.service.client.case_tables import measured_of
-from sprag_study.service.client.drafts import Draft, Entries, Quantity, Results, known, refined_results, results_of
+from sprag_study.service.client.drafts import Draft, Entries, Quantity, Results, known, refined_results, \
+results_of, sensors_of
 '''
 
 Schema = Mapping[str, Any]
@@ -165,7 +166,9 @@ def _value(name: str, schema: Schema) -> str:
             alone = "plus_minus" if _has(schema["items"], "plus_minus") else "values"
             return f"self._entries({name}, {alone!r})"
         case "Results":
-            return f"{'refined_results' if _has_names(schema['items']) else 'results_of'}({name})"
+            if _has_names(schema["items"]):
+                return f"refined_results({name})"
+            return f"sensors_of({name})" if _has(schema["items"], "gain") else f"results_of({name})"
         case "str | Sequence[str]":
             return f"[{name}] if isinstance({name}, str) else {name}"
     return name

@@ -215,5 +215,10 @@ def test_measured_points_are_a_table() -> None:
         assert draft["calibrate"]["measured"] == {"csv": text}
     rows = [{"shaft.load": "0.1 N*m", SPEED: 40.0}, {"shaft.load": 0.2, SPEED: 30.0}]
     assert cases(drive().calibrate(unknown={"damping": (0.001, 0.1)}, measured=rows)) > 2
+    sensors = {SPEED: {"gain": 1.02, "offset": ("-1 rad/s", "1 rad/s")}}
+    read = drive().calibrate(unknown={"damping": (0.001, 0.1)}, measured=rows, sensors=sensors)["calibrate"]["sensors"]
+    assert read == [{"result": SPEED, "gain": 1.02, "offset": {"from": "-1 rad/s", "to": "1 rad/s"}}]
+    with pytest.raises(ArgumentError, match="gain"):
+        drive().calibrate(unknown={"damping": (0.001, 0.1)}, measured=rows, sensors={SPEED: 1.02})
     with pytest.raises(ArgumentError, match="measured"):
         drive().calibrate(unknown={"damping": (0.001, 0.1)}, measured=3)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from tests.service.calibrating import CALIBRATE, calibration, spec_of
 from tests.service.conftest import Service
 
@@ -64,3 +66,16 @@ def test_faults_of_pasted_points_are_shown_and_the_fields_kept(service: Service)
     assert "0,1;x" in sent.text
     assert 'value="shaft.inertia"' in sent.text
     assert service.http.get("/studies/st-none/matters?ask=measurement").status_code == 404
+    fields |= {"measured": CALIBRATE["measured"]["csv"], "path0": "", "from0": "", "to0": ""}
+    for changes, told, wrong in (
+        ({"path2": "shaft.inertia", "to2": "1"}, "Parameter 3, from: must be a number", "from2"),
+        (
+            {"path2": "shaft.inertia", "from2": "1e-3", "to2": "3e-3", "gain_from1": "1.1"},
+            "Sensor 2, result: is required",
+            "sensor1",
+        ),
+    ):
+        sent = service.http.post("/calibrate", data=fields | changes)
+        assert sent.status_code == 422
+        assert told in sent.text
+        assert re.findall(r'<input id="(\w+)"[^>]*aria-invalid', sent.text) == [wrong]

@@ -88,6 +88,11 @@ def test_a_direction_alone_is_named_by_its_heading() -> None:
         f"{HARMONICS}0.amplitude_y": 3e-4, f"{HARMONICS}0.phase_y": 0.5,
     })  # fmt: skip
     assert "3 columns" in problems({**STILL, PLACE: {"csv": csv("angle,up", DEGREES, Y)}})[f"{PLACE}/csv"].message
+    turned = harmonics({"csv": csv("angle [deg],\N{CYRILLIC SMALL LETTER U} [mm],х_base [mm]", DEGREES, Y, X)})
+    assert turned == harmonics({"csv": ANGLED})
+    for headings in ("vertical [mm],x [mm]", "y [mm],horizontal [mm]", "x [mm],x [mm]"):
+        found = problems({**STILL, PLACE: {"csv": csv(f"angle [deg],{headings}", DEGREES, X, Y)}})[f"{PLACE}/csv"]
+        assert str(found.allowed) == "x and y, or one of them, behind the first column", headings
 
 
 def test_what_the_harmonics_leave_is_told() -> None:
