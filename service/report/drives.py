@@ -11,6 +11,7 @@ from sprag_study.service.figures.calibration import calibration_figure
 from sprag_study.service.figures.ribbons import ribbon_figure
 from sprag_study.service.languages import _
 from sprag_study.service.reading.reader import Phrase, joined, plural
+from sprag_study.service.results.calibration_words import sentences
 from sprag_study.service.results.defaults import drawn_results
 from sprag_study.service.results.headlines.along import judged_by
 from sprag_study.service.results.tolerances.batch import Asked
@@ -65,7 +66,7 @@ def calibration_part(found: Calibration) -> DrivesPart:
     if found.answer is None:
         return DrivesPart(None, "", (Phrase("The first fit has not ended yet."),))
     caption = _("Measured points on the fitted curve, and residuals")
-    return DrivesPart(calibration_figure(found), caption, (*_values(found), *found.sentences))
+    return DrivesPart(calibration_figure(found), caption, (*_values(found), *sentences(found)))
 
 
 def _values(found: Calibration) -> Iterator[str]:

@@ -25,6 +25,7 @@ from sprag_study.service.report.conditions import conditions
 from sprag_study.service.report.content import varies
 from sprag_study.service.report.drawn import chosen_image, drawing_images, image, map_images
 from sprag_study.service.results import refined
+from sprag_study.service.results.calibration_words import doubts
 from sprag_study.service.results.defaults import caption
 from sprag_study.service.results.key_answers import answers_of_model
 from sprag_study.service.results.refined import curve_plan
@@ -125,7 +126,7 @@ def _measured(report: Report) -> Text:
         return Text(
             _("with a measurement. Wear, heat and play in the bearings are not in the model."), lead=_("Not compared")
         )
-    notes = [upper_first(report.reading.say(text)) for text in found.sentences[:3]]
+    notes = [upper_first(report.reading.say(text)) for text in doubts(found)]
     return Text(" ".join([_("The values are those at which the model is nearest to the measured points."), *notes]),
                 lead=_("Compared with the measurement."))  # fmt: skip
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sprag_study.sentences import Amount, Name
+from sprag_study.sentences import Amount, Name, Part
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.reader import Phrase, joined, plural
 from sprag_study.service.reading.wording import percent
@@ -237,43 +237,24 @@ def reached(
     ``error`` is relative to the range as the requested one is, or absolute in the ``unit`` of the result (SI).
     ``failed`` says that cases were run and none of them has a result.
     """
+    sizes: list[Part] = [percent(asked.value), percent(error or 0.0)]
     if asked.absolute:
-        return _reached_absolute(asked.value, error, outside, unit, passed=passed, failed=failed)
-    wanted = percent(asked.value)
+        sizes = [Amount(asked.value, unit), Amount(error or 0.0, unit, digits=2)]
+    wanted, now = sizes
+    limit, reached_now = sizes if asked.absolute else [Phrase("{share} of the range", share=size) for size in sizes]
     if failed:
-        return Phrase("No case has a result, so that there is no error; {asked} of the range is asked.", asked=wanted)
+        return Phrase("No case has a result, so that there is no error; {asked} is asked.", asked=limit)
     if error is None:
-        return Phrase("The error is not known yet; {asked} of the range is asked.", asked=wanted)
-    now = percent(error)
+        return Phrase("The error is not known yet; {asked} is asked.", asked=limit)
     if passed and error <= asked.value:
         if outside:
-            text = N_("Within {asked} of the range, as asked, {outside} (estimate: {error}).")
-            return Phrase(text, asked=wanted, outside=outside, error=now)
-        return Phrase("Within {asked} of the range, as asked (estimate: {error}).", asked=wanted, error=now)
-    if outside:
-        text = N_("Not reached: {error} of the range now {outside}, {asked} asked.")
-        return Phrase(text, asked=wanted, outside=outside, error=now)
-    return Phrase("Not reached: {error} of the range now, {asked} asked.", asked=wanted, error=now)
-
-
-def _reached_absolute(
-    asked: float, error: float | None, outside: Phrase, unit: str, *, passed: bool, failed: bool
-) -> Phrase:
-    wanted = Amount(asked, unit)
-    if failed:
-        return Phrase("No case has a result, so that there is no error; {asked} is asked.", asked=wanted)
-    if error is None:
-        return Phrase("The error is not known yet; {asked} is asked.", asked=wanted)
-    now = Amount(error, unit, digits=2)
-    if passed and error <= asked:
-        if outside:
             text = N_("Within {asked}, as asked, {outside} (estimate: {error}).")
-            return Phrase(text, asked=wanted, outside=outside, error=now)
-        return Phrase("Within {asked}, as asked (estimate: {error}).", asked=wanted, error=now)
+            return Phrase(text, asked=limit, outside=outside, error=now)
+        return Phrase("Within {asked}, as asked (estimate: {error}).", asked=limit, error=now)
     if outside:
         text = N_("Not reached: {error} now {outside}, {asked} asked.")
-        return Phrase(text, asked=wanted, outside=outside, error=now)
-    return Phrase("Not reached: {error} now, {asked} asked.", asked=wanted, error=now)
+        return Phrase(text, asked=wanted, outside=outside, error=reached_now)
+    return Phrase("Not reached: {error} now, {asked} asked.", asked=wanted, error=reached_now)
 
 
 def asked_errors(plan: RefinePlan, names: Iterable[str]) -> dict[str, AskedError]:

@@ -10,7 +10,9 @@ from sprag_study.service.figures.calibration import calibration_figure
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.catalogue import unit_of
 from sprag_study.service.reading.reader import Phrase, joined
-from sprag_study.service.results.calibration import Calibration, calibration_csv, calibration_json, plan_of
+from sprag_study.service.results.calibration import Calibration, plan_of
+from sprag_study.service.results.calibration_answers import calibration_csv, calibration_json
+from sprag_study.service.results.calibration_words import doubts, sentences
 from sprag_study.service.views.relatives import asked_by
 from sprag_study.service.views.shown import Column, Shown, ShownTable
 from sprag_study.service.views.study_questions import CALIBRATION, CalibrationQuestion
@@ -65,7 +67,7 @@ class CalibrationView(StudyView[CalibrationQuestion, None, Calibration]):
         found = answer.result
         report = calibration_json(answer.study_id, found)
         tables = [_values(found, report), *_correlations(found, report), *_points(found, report)]
-        return Shown(found.sentences[1:], tables)
+        return Shown(sentences(found)[len(doubts(found)) :], tables)
 
 
 def _ends(interval: Sequence[float] | None, unit: str) -> Cell:

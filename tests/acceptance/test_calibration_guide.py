@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from sprag_study.service.jobs.local import run_here
-from sprag_study.service.results.calibration import calibration_json, calibration_of
+from sprag_study.service.results.calibration import calibration_of
+from sprag_study.service.results.calibration_answers import calibration_json
 from sprag_study.service.spec.document import parse_spec
 
 ROOT = Path(__file__).resolve().parents[2]

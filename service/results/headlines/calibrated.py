@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from sprag_study.sentences import Amount
 from sprag_study.service.reading.reader import Phrase, joined, plural
+from sprag_study.service.results.calibration_words import doubts
 from sprag_study.service.results.headlines.headline import MOST, NOTHING, Headline, KeyNumber, digits
 
 if TYPE_CHECKING:
     from sprag_study.service.results.calibration import Calibration
-
-#: Sentences about the fit and the measurement at most: whether it fits, an offset, a value far off.
-_DOUBTS: Final = 3
 
 
 def calibrated_headline(found: Calibration) -> Headline:
@@ -36,8 +34,8 @@ def calibrated_headline(found: Calibration) -> Headline:
         "{values}: that explains the {count} measured values best.",
         count, values=values,
     )  # fmt: skip
-    doubts = (joined("", [one]) for one in found.doubts[:_DOUBTS])
-    return Headline((fits, *doubts), every[:MOST], every[MOST:] and every)
+    told = (joined("", [one]) for one in doubts(found))
+    return Headline((fits, *told), every[:MOST], every[MOST:] and every)
 
 
 def _parameter(found: Calibration, place: int) -> KeyNumber:

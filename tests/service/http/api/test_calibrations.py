@@ -12,8 +12,13 @@ import pytest
 from sprag_study.service.answers.calibration import CalibrationReport
 from sprag_study.service.report.document import report_of
 from sprag_study.service.results import calibration as calibration_module
-from sprag_study.service.results.calibration import calibration_json, calibration_of
+from sprag_study.service.results.calibration import calibration_of
+from sprag_study.service.results.calibration_answers import calibration_json
+from sprag_study.service.results.calibration_words import doubts
+from sprag_study.service.results.calibration_words import sentences as sentences_of
+from sprag_study.service.views.calibration import CalibrationView
 from sprag_study.service.views.library import Library
+from sprag_study.service.views.study_view import StudyAnswer
 from tests.service.calibrating import CALIBRATE, DAMPING, INERTIA, calibration, measured
 from tests.service.conftest import API, Service
 from tests.service.shapes import fits
@@ -166,6 +171,11 @@ def test_the_report_has_the_calibration(service: Service) -> None:
     assert (report.answers, report.further) == (None, ((), ""))
     sentences = service.get(f"/studies/{study_id}/calibration")["sentences"]
     assert set(sentences) < set(report.calibration.sentences)
+    # What the answer says is not said again below it.
+    library = Library(service.store)
+    known = library.calibrations.of(study_id)
+    below = CalibrationView().shown(StudyAnswer(library, study_id, None, known)).sentences
+    assert [*doubts(known), *below] == sentences_of(known)
     assert "pendulums.0.damping = " in report.calibration.sentences[0]
     page = service.http.get(f"{API}/studies/{study_id}/report?format=html&appendix=calibration").text
     assert "<h2>Fitted values</h2>" in page

@@ -1,0 +1,304 @@
+"""What a calibration says of itself in sentences: whether the model fits, what the points determine, how sure it is."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from sprag_study.sentences import Amount, Name, Part
+from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.reader import Phrase, joined, plural
+from sprag_study.worker.planning.calibrate.answer import Answer, Direction
+from sprag_study.worker.planning.calibrate.lack_of_fit import CHANCE
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from sprag_study.service.results.calibration import Calibration
+
+
+#: Sentences about the fit and the measurement that belong to the answer at most: whether it fits, an offset, a value
+#: far off.
+_DOUBTS: Final = 3
+#: Probability below which a chi-square is not explained by chance.
+_CHANCE: Final = 0.01
+#: Part of the squares of the residuals that an offset has to take where the rest is no chance.
+_MOST_OF: Final = 0.9
+#: Standard deviations from which on a point is named.
+_FAR: Final = 4.0
+#: Share of refits that may end before they converge without a word.
+_ENDED: Final = 0.25
+_MOST_POINTS: Final = 5
+
+
+def sentences(found: Calibration) -> list[str]:
+    """What should be known before the values are used."""
+    known = found.answer
+    if known is None:
+        return []
+    return [
+        *_doubts(found, known),
+        *_deviations(found, known),
+        *(_undetermined(found, one) for one in known.directions),
+        *_bounds(found, known),
+        *_refits(found, known),
+        *_next_point(found, known),
+    ]
+
+
+def doubts(found: Calibration) -> list[str]:
+    """The first of these sentences, about the fit and the measurement, which belong to the answer."""
+    return [] if found.answer is None else list(_doubts(found, found.answer))[:_DOUBTS]
+
+
+def _doubts(found: Calibration, known: Answer) -> Iterator[str]:
+    """Whether the model fits, and what in the measurement may be wrong."""
+    yield from _fits(found)
+    yield from _chi_square(found, known)
+    yield from _shifted(found, known)
+    yield from _points(found, known)
+
+
+def _fits(found: Calibration) -> Iterator[Phrase]:
+    """Whether the residuals are chance, where no sigma says how large they may be."""
+    if found.plan.known_sigma:
+        return
+    test = found.test
+    if test is None:
+        yield Phrase("These points are too few to test whether the model fits: repeat some of them, or give sigma.")
+        return
+    values: dict[str, Part] = {
+        "name": Name(found.plan.results[test.column], within=True),
+        "p": Amount(test.p, "1", 2, form=".2g"),
+    }
+    if test.test == "runs":
+        values |= {"runs": round(test.statistic), "total": round(sum(test.freedom))}
+        if test.p < CHANCE:
+            yield Phrase(
+                "The {total} residuals of {name} keep their sign too long for chance ({runs} runs, p = {p}): the model "
+                "lacks something, or a value of the base is wrong, and the intervals are too narrow; free a further "
+                "parameter, or correct the base.",
+                **values,
+            )
+        else:
+            yield Phrase(
+                "The {total} residuals of {name} change their sign as by chance ({runs} runs, p = {p}): no lack of fit "
+                "shows.",
+                **values,
+            )
+        return
+    values["ratio"] = Amount(test.statistic, "1", 3, form=".3g")
+    if test.p < CHANCE:
+        yield Phrase(
+            "The fit misses {name} by more than repeated points scatter (F = {ratio}, p = {p}): the model lacks "
+            "something, or a value of the base is wrong, and the intervals are too narrow; free a further parameter, "
+            "or correct the base.",
+            **values,
+        )
+    else:
+        yield Phrase(
+            "The fit misses {name} by no more than repeated points scatter (F = {ratio}, p = {p}): no lack of fit "
+            "shows.",
+            **values,
+        )
+
+
+def _shifted(found: Calibration, known: Answer) -> Iterator[Phrase]:
+    """The offset that would explain the residuals."""
+    offset = min(known.offsets, key=lambda one: one.p, default=None)
+    if offset is not None and offset.p < _CHANCE and (offset.rest >= _CHANCE or offset.share >= _MOST_OF):
+        result = found.plan.results[offset.column]
+        unit = found.infos[result].unit
+        yield Phrase(
+            "An offset of {name} by {offset} (standard deviation {deviation}) would explain {share} % of the squares "
+            "of the residuals (p = {p}): check the zero of its sensor, or calibrate it too by `sensors`.",
+            name=Name(result, within=True),
+            offset=Amount(offset.value, unit, 3, form="+.3g"),
+            deviation=Amount(offset.deviation, unit, 2, form=".2g"),
+            share=round(100.0 * offset.share),
+            p=Amount(offset.p, "1", 2, form=".2g"),
+        )
+
+
+def _deviations(found: Calibration, known: Answer) -> Iterator[Phrase]:
+    """The standard deviations that follow from the residuals."""
+    plan = found.plan
+    _, columns = plan.places
+    for column, one in enumerate(plan.measured):
+        if not one.sigma:
+            sigma = float(known.sigma[columns == column][0])
+            yield Phrase(
+                "The standard deviation of {name} follows from the residuals: {sigma}.",
+                name=Name(one.result, within=True),
+                sigma=Amount(sigma, found.infos[one.result].unit, 4, form=".4g"),
+            )
+
+
+def _chi_square(found: Calibration, known: Answer) -> Iterator[Phrase]:
+    """Whether the residuals are as large as given standard deviations say."""
+    plan = found.plan
+    if not plan.known_sigma or known.freedom < 1:
+        return
+    values: dict[str, Part] = {"value": Amount(known.chi_square, "1", 3, form=".3g"), "freedom": known.freedom}
+    if plan.loss != "linear":
+        yield Phrase("Chi-square is {value} for {freedom} degrees of freedom, outliers included.", **values)
+        return
+    above = _chi_square_above(known.chi_square, known.freedom)
+    if above < _CHANCE:
+        yield Phrase(
+            "Chi-square is {value} for {freedom} degrees of freedom: the points are farther off than sigma explains; "
+            "the intervals are too narrow.",
+            **values,
+        )
+    elif above > 1.0 - _CHANCE:
+        yield Phrase(
+            "Chi-square is {value} for {freedom} degrees of freedom: the points scatter less than sigma; the intervals "
+            "are too wide.",
+            **values,
+        )
+    else:
+        yield Phrase(
+            "Chi-square is {value} for {freedom} degrees of freedom: the points scatter as sigma says.", **values
+        )
+
+
+def _chi_square_above(value: float, freedom: int) -> float:
+    from scipy.special import gammaincc
+
+    return float(gammaincc(0.5 * freedom, 0.5 * value))
+
+
+def _undetermined(found: Calibration, one: Direction) -> Phrase:
+    names = [found.called(place) for place in one.parameters]
+    if len(names) == 1:
+        return Phrase("These points do not determine {name}.", name=names[0])
+    changes = [
+        Phrase("{name} by {change}", name=name, change=Amount(change, found.unit(place), 3, form="+.3g"))
+        for place, name, change in zip(one.parameters, names, one.changes, strict=True)
+    ]
+    parts = {"names": _listed(names), "changes": _listed(changes)}
+    if one.undetermined:
+        return Phrase("These points cannot separate {names}: changing {changes} changes hardly any of them.", **parts)
+    return Phrase("These points hardly separate {names}: changing {changes} is within their scatter.", **parts)
+
+
+def _bounds(found: Calibration, known: Answer) -> Iterator[Phrase]:
+    if known.at_bounds is None:
+        return
+    for place, (one, (low, high)) in enumerate(zip(found.plan.fitted, known.at_bounds.tolist(), strict=True)):
+        unit, name = found.unit(place), found.called(place)
+        ends = [Amount(end, unit, 4, form=".4g") for end, reached in ((one.low, low), (one.high, high)) if reached]
+        if len(ends) == 1:
+            yield Phrase(
+                "The interval of {name} reaches the end of its range ({end}); a wider one may change it.",
+                name=name,
+                end=ends[0],
+            )
+        elif ends:
+            yield Phrase(
+                "The interval of {name} reaches both ends of its range ({low}, {high}); a wider one may change it.",
+                name=name,
+                low=ends[0],
+                high=ends[1],
+            )
+
+
+def _points(found: Calibration, known: Answer) -> Iterator[Phrase]:
+    failed = int(np.count_nonzero(known.failed))
+    if failed:
+        yield Phrase(
+            "{count} of {total} measured values have no result at the fitted values and are left out.",
+            count=failed,
+            total=found.plan.count,
+        )
+    lone = found.far
+    if lone is not None and lone.p < CHANCE:
+        yield Phrase(
+            "Measured value {number} ({point}) is far off the others ({count} standard deviations, Cook's distance "
+            "{cook}, p = {p}): check it, or let outliers count less by `loss`, such as soft_l1.",
+            number=lone.place + 1,
+            point=_named(found, lone.place),
+            count=Amount(abs(lone.deleted), "1", 3, form=".3g"),
+            cook=Amount(lone.cook, "1", 2, form=".2g"),
+            p=Amount(lone.p, "1", 2, form=".2g"),
+        )
+    residuals = np.where(known.failed, 0.0, known.residuals)
+    if lone is not None and lone.p < CHANCE:
+        residuals[lone.place] = 0.0
+    far = [index for index in np.argsort(-np.abs(residuals)).tolist() if abs(residuals[index]) > _FAR]
+    for index in far[:_MOST_POINTS]:
+        values: dict[str, Part] = {
+            "number": index + 1,
+            "point": _named(found, index),
+            "count": Amount(round(abs(residuals[index]), 1), "1", form=".1f"),
+        }
+        if found.plan.loss == "linear":
+            yield Phrase(
+                "Measured value {number} ({point}) is {count} standard deviations off the fit: check it, or let "
+                "outliers count less by `loss`, such as soft_l1.",
+                **values,
+            )
+        else:
+            yield Phrase("Measured value {number} ({point}) is {count} standard deviations off the fit.", **values)
+    if len(far) > _MOST_POINTS:
+        yield plural(
+            "{count} further value is more than {limit} standard deviations off.",
+            "{count} further values are more than {limit} standard deviations off.",
+            len(far) - _MOST_POINTS,
+            limit=Amount(_FAR, "1", form="g"),
+        )
+
+
+def _named(found: Calibration, index: int) -> Phrase:
+    """A measured value by its condition and what was read there."""
+    conditions, columns = found.plan.places
+    result = found.plan.results[columns[index]]
+    read = {result: (float(found.plan.values[index]), found.infos[result].unit)}
+    at = found.at(found.plan.at[conditions[index]])
+    every = {path: (value, unit_of(found.study, path)) for path, value in at.items()} | read
+    return joined(
+        ", ",
+        [
+            Phrase("{name} = {value}", name=Name(name, within=True), value=Amount(value, unit, 4, form=".4g"))
+            for name, (value, unit) in every.items()
+        ],
+    )
+
+
+def _refits(found: Calibration, known: Answer) -> Iterator[Phrase]:
+    if not found.summary["complete"]:
+        yield Phrase("The calibration has not run to its end.")
+    ended = known.refits - found.converged
+    if known.refits and ended > _ENDED * known.refits:
+        yield Phrase(
+            "{count} of {total} refits ended before they converged, as the results are not smooth: the intervals are "
+            "rough.",
+            count=ended,
+            total=known.refits,
+        )
+
+
+def _next_point(found: Calibration, known: Answer) -> Iterator[Phrase]:
+    one = known.next
+    if one is None:
+        return
+    best = int(np.argmax(one.narrower))
+    at = [
+        Phrase(
+            "{name} = {value}",
+            name=Name(path, within=True),
+            value=Amount(value, unit_of(found.study, path), 4, form=".4g"),
+        )
+        for path, value in zip(found.plan.paths_at, one.condition, strict=True)
+    ]
+    yield Phrase(
+        "A further measurement says most at {condition}: the interval of {name} would become {share} % narrower.",
+        condition=joined(", ", at),
+        name=found.called(best),
+        share=Amount(100.0 * float(one.narrower[best]), "1", 2, form=".2g"),
+    )
+
+
+def _listed(parts: Sequence[Part]) -> Phrase:
+    return Phrase("{first} and {last}", first=joined(", ", parts[:-1]), last=parts[-1])
