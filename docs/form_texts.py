@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from sprag_study.service.reading.wording import words
 from sprag_study.service.spec.described import ANY_RUN, DURATION, FIT, SETTLED_RUN, SHAFT_RUN
 from sprag_study.service.spec.draws.described import DISTRIBUTION
+from sprag_study.service.spec.kinds.calibrate import CALIBRATE
 from sprag_study.service.spec.kinds.goal import GOAL
 from sprag_study.service.spec.kinds.refine import REFINE
 from sprag_study.service.spec.kinds.tolerances import DRAWS
@@ -43,7 +44,12 @@ def form_values() -> Iterator[str]:
         INTERPOLATION,
         PHI_C,
     )
-    plan = (*GOAL.described.values(), REFINE.listed["results"], *REFINE.described.values())
+    plan = (
+        *CALIBRATE.described.values(),
+        *GOAL.described.values(),
+        REFINE.listed["results"],
+        *REFINE.described.values(),
+    )
     entries = (
         *SETTLED_RUN.values(),
         DURATION,

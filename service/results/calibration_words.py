@@ -10,7 +10,7 @@ from sprag_study.sentences import Amount, Name, Part
 from sprag_study.service.reading.catalogue import unit_of
 from sprag_study.service.reading.reader import Phrase, joined, plural
 from sprag_study.worker.planning.calibrate.answer import Answer, Direction
-from sprag_study.worker.planning.calibrate.lack_of_fit import CHANCE
+from sprag_study.worker.planning.calibrate.lack_of_fit import CHANCE, Offset
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -56,7 +56,7 @@ def _doubts(found: Calibration, known: Answer) -> Iterator[str]:
     """Whether the model fits, and what in the measurement may be wrong."""
     yield from _fits(found)
     yield from _chi_square(found, known)
-    yield from _shifted(found, known)
+    yield from _shifted(found)
     yield from _points(found, known)
 
 
@@ -104,10 +104,17 @@ def _fits(found: Calibration) -> Iterator[Phrase]:
         )
 
 
-def _shifted(found: Calibration, known: Answer) -> Iterator[Phrase]:
+def advised(found: Calibration) -> Offset | None:
+    """The offset that would explain the residuals; None for none."""
+    offset = min(found.answer.offsets if found.answer else (), key=lambda one: one.p, default=None)
+    explains = offset is not None and (offset.rest >= _CHANCE or offset.share >= _MOST_OF)
+    return offset if explains and offset is not None and offset.p < _CHANCE else None
+
+
+def _shifted(found: Calibration) -> Iterator[Phrase]:
     """The offset that would explain the residuals."""
-    offset = min(known.offsets, key=lambda one: one.p, default=None)
-    if offset is not None and offset.p < _CHANCE and (offset.rest >= _CHANCE or offset.share >= _MOST_OF):
+    offset = advised(found)
+    if offset is not None:
         result = found.plan.results[offset.column]
         unit = found.infos[result].unit
         yield Phrase(

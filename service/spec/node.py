@@ -126,7 +126,7 @@ class Node:
         try:
             return parse(self.value)
         except ClauseError as error:
-            self.refuse(error.code, error.message, allowed=allowed, unit=unit)
+            self._refuse_unread(error, allowed, unit)
             return None
 
     def exact(self, parameter: Parameter) -> Fraction | None:
@@ -136,8 +136,15 @@ class Node:
         try:
             return exact(self.value, parameter)
         except QuantityError as error:
-            self.refuse(error.code, error.message, allowed=range_sentence(parameter), unit=parameter.unit)
+            self._refuse_unread(error, range_sentence(parameter), parameter.unit)
             return None
+
+    def _refuse_unread(self, error: ClauseError, allowed: str | None, unit: str | None) -> None:
+        """Record why a value cannot be read, or, where nothing is given, that it is required."""
+        if not self.given:
+            self.refuse("required", "is required", allowed=allowed, unit=unit)
+        else:
+            self.refuse(error.code, error.message, allowed=allowed, unit=unit)
 
     def number(self, parameter: Parameter) -> float | None:
         """The double nearest to `exact`."""

@@ -20,6 +20,7 @@ _SECTIONS: Final = {
     "/exclude": "sampling",
     "/refine": "guide-refinement#what-to-write",
     "/goal": "guide-goals#what-to-write",
+    "/calibrate": "guide-calibration#what-to-write",
     "/tolerances": "guide-tolerances#the-study",
     "/seed": "guide-tolerances#the-study",
     "/draws": "guide-tolerances#the-study",

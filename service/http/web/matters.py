@@ -22,8 +22,9 @@ from sprag_study.service.http.reading import file_pairs
 from sprag_study.service.http.routers import page_router
 from sprag_study.service.http.threads import in_thread
 from sprag_study.service.http.views import study_address
-from sprag_study.service.http.web import calibrate
 from sprag_study.service.http.web.figures.drawn import cases_of
+from sprag_study.service.http.web.form import calibration
+from sprag_study.service.http.web.form.parts import reshape
 from sprag_study.service.http.web.form.values import Form
 from sprag_study.service.http.web.good_drives import (
     PARTS,
@@ -48,6 +49,7 @@ from sprag_study.service.results.headlines.influence import influence_headline
 from sprag_study.service.spec.stored import accepted
 from sprag_study.service.spec.text import Body
 from sprag_study.service.views.batch import batch_shown
+from sprag_study.service.views.calibration import CalibrationView
 from sprag_study.service.views.drives import RibbonView
 from sprag_study.service.views.headline import headline_of
 from sprag_study.service.views.library import reading_of
@@ -59,6 +61,7 @@ from sprag_study.worker.spread import DRIVE
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from sprag_study.service.http.web.form.entries import Faults, Values
     from sprag_study.service.http.work import Work
     from sprag_study.service.reading.reader import Choice
     from sprag_study.service.views.library import Library
@@ -101,7 +104,11 @@ def seen(
         head = head if reached is None else with_yield(head, reached)
     else:
         figure, shown = view.drawn_in(answer, 2), view.shown(answer)
-    return inline(figure, reading_of(library.store, study_id, choice), shown, cases, broad=True), head
+    reading, further = reading_of(library.store, study_id, choice), None
+    if isinstance(view, CalibrationView):
+        spec = accepted(library.store.studies.spec(study_id), answer.study)
+        further = calibration.again(spec, study_id, answer.result, reading)
+    return replace(inline(figure, reading, shown, cases, broad=True), further=further), head
 
 
 @router.get("/studies/{study_id:study}/matters")
@@ -118,10 +125,10 @@ async def matters_page(work: Attended, study_id: StudyId, ask: Annotated[str, Qu
 
 
 async def answered(
-    work: Work, study_id: str, ask: str = "", pasted: Mapping[str, str] | None = None, faults: Sequence[Fault] = (),
+    work: Work, study_id: str, ask: str = "", filled: Values | None = None, faults: Faults | None = None,
     status: int = 200,
 ) -> Response:  # fmt: skip
-    """The page of a question; ``pasted`` are the fields of a new calibration, with what is wrong with them."""
+    """The page of a question; ``filled`` are the fields of a new calibration, with what is wrong with them."""
     context = work.context
     study = await in_thread(context.store.studies.study, study_id)
     known = [name for name, views in ASKS.items() if STUDY_VIEWS[views[0]].has(study)]
@@ -130,7 +137,10 @@ async def answered(
         raise ApiError("not-found", Sentence("There is no such question."))
     reading = await in_thread(reading_of, context.store, study_id, current().choice)
     params = _places(study, with_held(work.request.query_params, study, reading))
-    every = [_asked(study, name, params) for name in (ASKS[ask] if ask in known else ())]
+    if filled is None and ask == "measurement" and (ask not in known or "again" in params):
+        spec = await in_thread(context.store.studies.spec, study_id)
+        filled = calibration.values_of(await in_thread(accepted, spec, study), params)
+    every = [_asked(study, name, params) for name in (ASKS[ask] if ask in known and filled is None else ())]
     ready = {one.about.name: one.chosen for one in every if one.ready}
     found, head = None, Headline()
     try:
@@ -143,7 +153,7 @@ async def answered(
     if any(one.faults for one in every):
         status = 422
     return await in_thread(_page, context, study_id, study, ask, known, every, found, head, status,
-                           (pasted or {}, faults))  # fmt: skip
+                           filled and calibration.shown(study, filled, faults))  # fmt: skip
 
 
 def _asked(study: Study, name: str, params: QueryParams) -> Asked:
@@ -172,8 +182,9 @@ def _places(study: Study, params: QueryParams) -> QueryParams:
 def _page(
     context: Context, study_id: str, study: Study, ask: str, known: Sequence[str],
     every: Sequence[Asked], found: Seen | None, head: Headline, status: int,
-    new: tuple[Mapping[str, str], Sequence[Fault]],
+    form: dict[str, Any] | None,
 ) -> Response:  # fmt: skip
+    """The page of a question, with its answer or with the ``form`` of a new calibration."""
     frame = study_frame(context, study_id)
     reading, cases = frame["reading"], f"/studies/{study_id}/cases/"
     pairs = every[0].pairs if every else []
@@ -182,9 +193,8 @@ def _page(
     conditions = [text for asked in every for name, text in asked.pairs if name == "condition"]
     fixed = fixed_choices(study, drawn, tuple(places.items()), reading) if ask == "tolerances" else []
     address = study_address(study_id)
-    paste = calibrate.fields(context, study_id, *new) if ask == "measurement" and ask not in known else None
     return page(
-        "matters.html",
+        "measured.html" if form else "matters.html",
         status=status,
         **frame,
         ask=ask,
@@ -201,13 +211,13 @@ def _page(
         ],
         conditions=condition_rows(conditions, study),
         relations=RELATIONS,
-        parts=PARTS,
+        condition_parts=PARTS,
         results=conditionable(study),
         fixed=[one for one in fixed if one["path"] != DRIVE],
         asks_more=any(one.asked.setting.label for asked in every for one in asked.fields),
         cases=cases,
-        paste=paste,
         saves=next((old for old, own in OLD.items() if own == ask and old != "calibration"), ""),
+        **(form or {}),
     )
 
 
@@ -219,17 +229,19 @@ def calibrate_page(study: Annotated[str, Query(pattern=ID_PATTERN)]) -> Response
 
 @router.post("/calibrate")
 async def send_points(context: Ctx, work: Attended, values: Form) -> Response:
-    """Submit the calibration, or show what is wrong with it."""
-    study_id = values.get("study", "")
+    """Submit the calibration, or show what is wrong with it; or add or remove a row of its form."""
+    study_id, wanted = values.get("study", ""), values.pop("do", "submit")
+    if wanted != "submit":
+        reshape(values, wanted, calibration.PARTS)
+        return await answered(work, study_id, "measurement", values, {})
     spec = await in_thread(context.store.studies.spec, study_id)
     study = await in_thread(context.store.studies.study, study_id)
-    content = json.dumps(calibrate.calibration_spec(await in_thread(accepted, spec, study), values)).encode()
+    spec, form = calibration.form_with_spec(await in_thread(accepted, spec, study), values)
     try:
-        record = await work.submit(checks.new_study, Body(content))
+        record = await work.submit(checks.new_study, Body(json.dumps(spec).encode()))
     except FaultError as error:
-        faults = error.faults or (Fault(None, "conflict", error.detail),)
-        status = api_error(error).type.status
-        return await answered(work, study_id, "measurement", values, faults, status)
+        faults = calibration.faults_of(form, error.faults or (Fault(None, "conflict", error.detail),))
+        return await answered(work, study_id, "measurement", values, faults, api_error(error).type.status)
     return RedirectResponse(f"/studies/{record.id}", status_code=303)
 
 

@@ -94,7 +94,7 @@ class Seen:
     """A view as a page shows it: its figure, "" for none, and what people read of it; or a note why there is nothing.
 
     ``others`` is what the figure has no room for. ``later`` says that the page has to ask for it once more;
-    ``frames`` move the drawing of a machine.
+    ``frames`` move the drawing of a machine. ``further`` is the address of what the answer advises, and its label.
     """
 
     figure: Markup = EMPTY
@@ -103,6 +103,7 @@ class Seen:
     note: str = ""
     later: bool = False
     frames: Mapping[str, Any] | None = None
+    further: tuple[str, str] | None = None
 
 
 def inline(figure: Figure, reading: Reading, shown: Shown, cases: str, *, broad: bool = False) -> Seen:

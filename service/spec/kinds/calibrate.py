@@ -38,6 +38,10 @@ _CSV: Final = (
     "standard deviation (sigma); units in brackets"
 )
 _LOSS: Final = "how much a large residual counts: linear (least squares), or less with the others"
+_OUTLIERS: Final = {
+    "linear": "count fully (least squares)", "soft_l1": "count less (soft_l1)", "huber": "count less (huber)",
+    "cauchy": "hardly count (cauchy)",
+}  # fmt: skip
 _REFITS: Final = "refits of the bootstrap, which gives the intervals; 0 for none"
 _GAIN: Final = "how many times the modelled value the sensor reads: a number, or from .. to where it is fitted too"
 _OFFSET: Final = "what the sensor reads at a modelled value of 0: a quantity, or from .. to where it is fitted too"
@@ -61,7 +65,7 @@ CALIBRATE: Final = Record(
         "measured": _MEASURED,
         "sensors": _SENSORS,
         **named(
-            choice("loss", _LOSS, *LOSSES, default="linear"),
+            choice("loss", _LOSS, *LOSSES, default="linear", label="Outliers", called=_OUTLIERS),
             Described("refits", "Refits", _REFITS, "whole", *REFITS, 200),
             Described("seed", "Seed", "seed of the random numbers", "whole", 0, 2**32 - 1, 1),
         ),

@@ -89,9 +89,9 @@ def _form(walk: Walk) -> dict[str, str]:
 
 
 def _points(walk: Walk) -> dict[str, str]:
-    fields = {"study": walk.waiting(), "measured": CALIBRATE["measured"]["csv"], "loss": "huber"}
+    fields = {"study": walk.waiting(), "/calibrate/measured/csv": CALIBRATE["measured"]["csv"], "unknown": "2"}
     for row, one in enumerate(CALIBRATE["unknown"]):
-        fields |= {f"path{row}": one["path"], f"from{row}": str(one["from"]), f"to{row}": str(one["to"])}
+        fields |= {f"/calibrate/unknown/{row}/{name}": str(text) for name, text in one.items()}
     return fields
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from sprag_study.service.cli.extend import _values
 from sprag_study.service.faults import FaultError
-from sprag_study.service.http.web.calibrate import calibration_spec
+from sprag_study.service.http.web.form import calibration
 from sprag_study.service.http.web.form.check import check_form
 from sprag_study.service.http.web.form.entries import list_of
 from sprag_study.service.http.web.form.machine_spec import base_of
@@ -214,8 +214,9 @@ def test_steps_of_a_shaft_and_unknown_parameters_of_a_calibration() -> None:
     assert [step[name] for step in steps for name in ("from", "to")] == [
         "0 deg", "90 deg", "90 deg", "180 deg", "180 deg", "270 deg",
     ]  # fmt: skip
-    unknown = calibration_spec(SPEC, {"path0": LOAD, "from0": "100", "to0": "1000 N*mm"})["calibrate"]["unknown"]
-    assert unknown == [{"path": LOAD, "from": "100 N*mm", "to": "1000 N*mm"}]
+    ends = {"unknown": "1", "/calibrate/unknown/0/path": LOAD, "/calibrate/unknown/0/from": "100"}
+    spec, _form = calibration.form_with_spec(SPEC, {**ends, "/calibrate/unknown/0/to": "1000 N*mm"})
+    assert spec["calibrate"]["unknown"] == [{"path": LOAD, "from": "100 N*mm", "to": "1000 N*mm"}]
 
 
 def test_steps_of_a_spec_are_asked_about() -> None:

@@ -23,7 +23,9 @@ from sprag_study.worker.models import Parameter
 from sprag_study.worker.models.form import Form
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
+
+    from sprag_study.worker.models import ResultInfo
 
 #: The model that the form describes unless another is chosen.
 FORM_MODEL: Final = "vibration-drive"
@@ -146,15 +148,24 @@ def result_choices(reading: Reading, rows: Callable[[str], int], *, numbers: boo
 
     ``rows`` is the number of rows of each list of the machine.
     """
-    groups: dict[str, list[Choice]] = {}
+    results = []
     for entry in models.result_catalogue(reading.model):
         first, indexed, _rest = entry.name.partition(".N.")
-        for index in range(rows(first) if indexed else 1):
-            name = entry.name.replace(".N.", f".{index}.")
-            group = words(".".join(name.split(".")[:2])) if indexed else N_("Machine")
-            if not (numbers and entry.kind == "category"):
-                choice = Choice(name, reading.caption(name), reading.unit(entry.unit))
-                groups.setdefault(_(group), []).append(choice)
+        results += [replace(entry, name=entry.name.replace(".N.", f".{index}."))
+                    for index in range(rows(first) if indexed else 1)]  # fmt: skip
+    return grouped_results(reading, (entry for entry in results if not (numbers and entry.kind == "category")))
+
+
+def grouped_results(reading: Reading, results: Iterable[ResultInfo]) -> Groups:
+    """Results of a study as choices, by group."""
+    groups: dict[str, list[Choice]] = {}
+    for entry in results:
+        first, _dot, rest = entry.name.partition(".")
+        index = rest.partition(".")[0]
+        group = words(f"{first}.{index}") if index.isdecimal() else N_("Machine")
+        groups.setdefault(_(group), []).append(
+            Choice(entry.name, reading.caption(entry.name), reading.unit(entry.unit))
+        )
     return list(groups.items())
 
 

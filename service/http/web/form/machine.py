@@ -336,13 +336,20 @@ def _general(path: str) -> str:
 
 def choices_of(values: Mapping[str, str], base: Mapping[str, Any]) -> Groups:
     """The parameters of a machine that can vary, by group; none while its structure cannot be read."""
-    model, form = model_name(values), form_of(values)
+    model = model_name(values)
+    known = part_of(model).read_base(Node(Report(), BASE, base)).parameters
+    return grouped(model, {path: entry.unit for path, entry in known.items()})
+
+
+def grouped(model: str, units: Mapping[str, str]) -> Groups:
+    """Parameters with their units as choices, by group."""
+    form = models.model_of(model).presentation.form
     groups: dict[str, list[Choice]] = {}
-    for path, entry in part_of(model).read_base(Node(Report(), BASE, base)).parameters.items():
+    for path, unit in units.items():
         group, known = group_of(model, path), form.labels.get(_general(path))
         number = int(path.rpartition(".")[2]) + 1 if known else 0
         label = _(known, part=group, number=number) if known else Reading(model).caption(path)
-        groups.setdefault(group, []).append(Choice(path, label, entry.unit))
+        groups.setdefault(group, []).append(Choice(path, label, unit))
     return list(groups.items())
 
 

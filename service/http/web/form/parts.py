@@ -27,11 +27,13 @@ def count_of(values: Mapping[str, str], name: str) -> int:
     return 0 if part is None else part.count(values)
 
 
-def reshape(values: Values, wanted: str) -> None:
-    """Add or remove a row of a part, as the pressed button requests; the other fields are kept."""
+def reshape(values: Values, wanted: str, parts: Mapping[str, Rows] | None = None) -> None:
+    """Add or remove a row of one of ``parts``, by default those of a study, as the pressed button requests; the other
+    fields are kept.
+    """
     action, _, index = wanted.partition(" ")
     verb, _, name = action.partition("-")
-    part = parts_of(values).get(name)
+    part = (parts_of(values) if parts is None else parts).get(name)
     if part is not None and verb == "add":
         _add_row(values, name, part)
     elif part is not None and verb == "drop" and (place := whole_number(index, part.most)) is not None:
@@ -40,7 +42,7 @@ def reshape(values: Values, wanted: str) -> None:
 
 def _add_row(values: Values, name: str, part: Rows) -> None:
     """Add a row, unless there are as many as there may be."""
-    rows, count = part.listed, count_of(values, name)
+    rows, count = part.listed, part.count(values)
     if rows is not None and rows.alone and not count:
         _enclose(values, rows)
         count = 1
@@ -114,7 +116,7 @@ def unshared(values: Values) -> Values:
 
 def _drop_row(values: Values, name: str, part: Rows, index: int) -> None:
     """Remove a row, unless there must be as many; those behind it move up."""
-    count = count_of(values, name)
+    count = part.count(values)
     if index >= count or (part.listed is not None and count <= part.listed.least):
         return
     for pointer in with_tolerances(part.pointer):

@@ -415,14 +415,14 @@ def _components_in(text: str) -> list[dict[str, Any]]:
     return []
 
 
-_PATHS: Final = Cell(("path",), ("path", "tied"), _paths, _path_fields)
-_RANGE: Final = Cell(
+PATHS: Final = Cell(("path",), ("path", "tied"), _paths, _path_fields)
+RANGE: Final = Cell(
     ("from", "to"), ("from", "to"), Filled.ranged,
     lambda item: {name: text_of(item[name]) for name in ("from", "to")},
 )  # fmt: skip
 _AXIS_VALUES: Final = Cell(("values", "range", *_SPACINGS), ("values",) * 5, _axis_values, _axis_text)
 _VARIABLE_VALUES: Final = Cell(("values", "from", "to"), ("values",) * 3, _variable_values, _variable_text)
-_RESULT: Final = typed("result", lambda text: text or None, str, always=True)
+RESULT: Final = typed("result", lambda text: text or None, str, always=True)
 _TOWARD: Final = Cell(
     ("max",), ("toward",), lambda form: {"max": True} if form.text("toward", "max") == "max" else {},
     lambda item: {"toward": "max" if item.get("max", False) else "min"}, counts=False,
@@ -464,25 +464,25 @@ PARTS: Final = {
     for rows in (
         Rows(
             "axes", "/axes", MAX_AXES,
-            _Varied(Record((_PATHS, _AXIS_VALUES, chosen(SWEPT.name)), whole="/path")),
+            _Varied(Record((PATHS, _AXIS_VALUES, chosen(SWEPT.name)), whole="/path")),
         ),
         Rows(
             "vary", "/goal/vary", GOAL.listed["vary"].high,
-            _Varied(Record((_PATHS, _VARIABLE_VALUES), whole="/values")),
+            _Varied(Record((PATHS, _VARIABLE_VALUES), whole="/values")),
         ),
         Rows(
             "best", "/goal/best", GOAL.listed["best"].high,
-            Record((_RESULT, _TOWARD, *_OF_DRIVES, *_COUNTED), whole="/result"),
+            Record((RESULT, _TOWARD, *_OF_DRIVES, *_COUNTED), whole="/result"),
             new={"toward": "max"}, always=False,
         ),
         Rows(
             "subject_to", "/goal/subject_to", GOAL.listed["subject_to"].high,
-            Record((_RESULT, _LIMIT, *_OF_DRIVES, *_COUNTED), whole="/result"), new={"kind": "at_most"}, always=False,
+            Record((RESULT, _LIMIT, *_OF_DRIVES, *_COUNTED), whole="/result"), new={"kind": "at_most"}, always=False,
         ),
         _AT,
         _ASKED,
         Rows(
-            "ranges", "/sample/ranges", MAX_AXES, Record((_PATHS, _RANGE, chosen(SCALE.name)), whole="/from"),
+            "ranges", "/sample/ranges", MAX_AXES, Record((PATHS, RANGE, chosen(SCALE.name)), whole="/from"),
             whole="/sample/count",
         ),
         Rows("exclude", "/exclude", _MOST, _Condition(), always=False),

@@ -64,8 +64,8 @@ class Filled:
         return entries
 
     def ranged(self) -> dict[str, Any]:
-        """The ends of a range by the names of their fields."""
-        names = ("from", "to")
+        """The ends of a range that are filled in, by the names of their fields."""
+        names = [name for name in ("from", "to") if self.text(name)]
         return dict(zip(names, self.together([self.text(name) for name in names], names), strict=True))
 
     def together(self, texts: Sequence[str], names: Sequence[str]) -> list[Any]:

@@ -52,7 +52,7 @@ sprag.drafts = (() => {
   return { keep, waiting, offer, submitted };
 })();
 
-// A form that has the same fields whatever is typed.
+// A form that has the same fields whatever is typed, or a button with the value of data-draft that makes it again with others.
 for (const form of document.querySelectorAll("form[data-draft]")) {
   const fill = (fields) => {
     const left = [...fields];
@@ -65,9 +65,16 @@ for (const form of document.querySelectorAll("form[data-draft]")) {
       else if (at >= 0) field.value = left[at][1];
       if (at >= 0) left.splice(at, 1);
     }
+    if (form.dataset.draft && left.some(([name]) => name.startsWith("/") && !form.elements.namedItem(name))) {
+      const hidden = ([name, value]) => Object.assign(document.createElement("input"), { type: "hidden", name, value });
+      form.replaceChildren(...fields.map(hidden));
+      sprag.drafts.submitted(form);
+      form.append(hidden(["do", form.dataset.draft]));
+      form.submit();
+    }
     return true;
   };
-  const draft = sprag.drafts.waiting(form, Boolean(document.querySelector("main .fault, main .wrong:not(:empty)")));
+  const draft = sprag.drafts.waiting(form, Boolean("again" in form.dataset || document.querySelector("main .fault, main .wrong:not(:empty)")));
   if (draft) sprag.drafts.offer(form, draft, fill);
   form.addEventListener("input", () => sprag.drafts.keep(form));
   form.addEventListener("submit", () => sprag.drafts.submitted(form));

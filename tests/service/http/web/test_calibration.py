@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import html
+import math
 import re
+from typing import Final
 
-from tests.service.calibrating import CALIBRATE, calibration, spec_of
+from tests.service.calibrating import CALIBRATE, calibration, measured, spec_of
 from tests.service.conftest import Service
+
+#: Field of the measured points.
+CSV: Final = "/calibrate/measured/csv"
 
 
 def test_the_page_shows_values_points_and_figure(service: Service) -> None:
@@ -33,6 +39,14 @@ def test_a_calibration_without_a_fit_has_a_page(service: Service) -> None:
     assert "The first fit has not ended yet." in answer.text
 
 
+def filled(study_id: str, **fields: str) -> dict[str, str]:
+    """The form of that calibration, as a browser sends it."""
+    values = {"study": study_id, "unknown": "3", "sensors": "2", CSV: CALIBRATE["measured"]["csv"]}
+    for row, one in enumerate(CALIBRATE["unknown"]):
+        values |= {f"/calibrate/unknown/{row}/{name}": str(text) for name, text in one.items()}
+    return values | {f"/calibrate/{name}": text for name, text in fields.items()}
+
+
 def test_pasted_points_become_a_study(service: Service) -> None:
     study_id = service.submit()
     own = f"/studies/{study_id}/matters?ask=measurement"
@@ -42,10 +56,8 @@ def test_pasted_points_become_a_study(service: Service) -> None:
     empty = service.http.get(own)
     assert empty.status_code == 200
     assert 'value="pendulums.0.damping"' in empty.text
-    fields = {"study": study_id, "measured": CALIBRATE["measured"]["csv"], "loss": "huber"}
-    for row, one in enumerate(CALIBRATE["unknown"]):
-        fields |= {f"path{row}": one["path"], f"from{row}": str(one["from"]), f"to{row}": str(one["to"])}
-    fields |= {"sensor0": "shaft.speed.mean", "gain_from0": "1,02", "offset_from0": "-1", "offset_to0": "1 rad/s"}
+    sensor = {"result": "shaft.speed.mean", "gain": "1,02", "offset": "-1 to 1 rad/s"}
+    fields = filled(study_id, loss="huber", **{f"sensors/1/{name}": text for name, text in sensor.items()})
     sent = service.http.post("/calibrate", data=fields, follow_redirects=False)
     assert sent.status_code == 303, sent.text
     made = sent.headers["location"].rpartition("/")[2]
@@ -54,28 +66,51 @@ def test_pasted_points_become_a_study(service: Service) -> None:
     sensors = [{"result": "shaft.speed.mean", "gain": 1.02, "offset": offset}]
     expected = service.store.studies.study(service.submit(spec_of(loss="huber", refits=200, sensors=sensors))).plan
     assert plan == expected
+    # Its fields are those of a further calibration.
+    further = service.http.get(f"/studies/{made}/matters?ask=measurement&again=on").text
+    for text in ("-1 to 1 rad/s", "0.5e-3 kg*m^2", "pendulums.*.damping"):
+        assert f'value="{text}"' in further
+    assert '<option value="huber" selected>' in further
+    assert 'id="sensors" open' in further
 
 
-def test_faults_of_pasted_points_are_shown_and_the_fields_kept(service: Service) -> None:
+def test_rows_of_the_form_are_added_and_removed(service: Service) -> None:
+    fields = filled(service.submit(), **{"sensors/0/gain": "1.1"})
+    more = service.http.post("/calibrate", data=fields | {"do": "add-sensors"})
+    assert more.status_code == 200
+    assert 'name="sensors" value="3"' in more.text
+    assert 'name="/calibrate/sensors/2/result"' in more.text
+    assert CALIBRATE["measured"]["csv"][:40] in more.text
+    fewer = service.http.post("/calibrate", data=fields | {"do": "drop-unknown 0"}).text
+    assert 'name="unknown" value="2"' in fewer
+    assert 'name="/calibrate/unknown/0/from" value="0.5e-3 kg*m^2"' in fewer
+
+
+def test_an_offset_that_is_advised_is_filled_in_by_a_link(service: Service) -> None:
+    unknown, points = [CALIBRATE["unknown"][1]], {"csv": measured(0.8, sigma=False)}
+    study_id = calibration(service, unknown=unknown, measured=points, refits=0)
+    text = service.http.get(f"/studies/{study_id}/matters").text
+    address, label = re.findall(r'<a class="button" href="([^"]*again[^"]*)">([^<]*)<', text)[0]
+    assert re.fullmatch(r"Calibrate again with an offset of mean shaft speed near 7\.\d+ rpm", label), label
+    form = service.http.get(html.unescape(address)).text
+    span = re.findall(r'name="/calibrate/sensors/0/offset" value="(\S+) to (\S+) rpm"', form)[0]
+    low, high = map(float, span)
+    assert low < 0.8 * 30.0 / math.pi < high
+    assert '<option value="shaft.speed.mean" selected>' in form
+
+
+def test_faults_of_pasted_points_are_beside_their_fields(service: Service) -> None:
     study_id = service.submit()
-    fields = {"study": study_id, "measured": "shaft.load;shaft.speed.mean\n0,1;x\n0,2;20\n", "path0": "shaft.inertia"}
-    fields |= {"from0": "0.001", "to0": "0.003"}
-    sent = service.http.post("/calibrate", data=fields)
-    assert sent.status_code == 422
-    assert "line 2, column shaft.speed.mean" in sent.text
-    assert "0,1;x" in sent.text
-    assert 'value="shaft.inertia"' in sent.text
-    assert service.http.get("/studies/st-none/matters?ask=measurement").status_code == 404
-    fields |= {"measured": CALIBRATE["measured"]["csv"], "path0": "", "from0": "", "to0": ""}
     for changes, told, wrong in (
-        ({"path2": "shaft.inertia", "to2": "1"}, "Parameter 3, from: must be a number", "from2"),
-        (
-            {"path2": "shaft.inertia", "from2": "1e-3", "to2": "3e-3", "gain_from1": "1.1"},
-            "Sensor 2, result: is required",
-            "sensor1",
-        ),
+        ({"measured/csv": "shaft.load;shaft.speed.mean\n0,1;x\n0,2;20\n"}, "line 2, column shaft.speed.mean", CSV),
+        ({"unknown/2/path": "pendulums.0.mass", "unknown/2/to": "1"}, "is required", "/calibrate/unknown/2/from"),
+        ({"sensors/1/gain": "1.1"}, "is required", "/calibrate/sensors/1/result"),
+        ({"sensors/1/result": "shaft.speed.mean", "sensors/1/gain": "x"}, "got x", "/calibrate/sensors/1/gain"),
+        ({"refits": "many"}, "must be a whole number", "/calibrate/refits"),
     ):
-        sent = service.http.post("/calibrate", data=fields | changes)
+        sent = service.http.post("/calibrate", data=filled(study_id, **changes))
         assert sent.status_code == 422
-        assert told in sent.text
-        assert re.findall(r'<input id="(\w+)"[^>]*aria-invalid', sent.text) == [wrong]
+        assert re.findall(r'id="(/calibrate[^"]*)"[^>]*aria-invalid', sent.text) == [wrong]
+        assert told in sent.text.partition(f'id="wrong:{wrong}"')[2].partition("</span>")[0]
+        assert "0.5e-3 kg*m^2" in sent.text
+    assert service.http.get("/studies/st-none/matters?ask=measurement").status_code == 404

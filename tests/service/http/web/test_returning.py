@@ -69,12 +69,17 @@ def test_drafts_of_a_calibration_and_a_schedule(visitor: Visitor, office: Office
     page = visitor.page
     page.goto(f"/studies/{example}/matters?ask=measurement")
     page.get_by_label("A line of headings").fill("shaft.load [N*m],shaft.speed.mean [rad/s]")
+    page.locator("#sensors > summary").click()
+    page.get_by_role("button", name="Add a sensor").click()  # the server makes the form again
+    named(page, "/calibrate/sensors/1/gain").fill("1.02")
+    page.get_by_text("Outliers and refits").click()
     page.get_by_label("Outliers").select_option("huber")
     page.wait_for_function("() => Object.values(localStorage).some((text) => text.includes('huber'))")
-    page.reload()
+    page.goto(f"/studies/{example}/matters?ask=measurement")
     page.locator(OFFER).get_by_role("button", name="Continue with it").click()
     expect(page.get_by_label("A line of headings")).to_have_value("shaft.load [N*m],shaft.speed.mean [rad/s]")
     expect(page.get_by_label("Outliers")).to_have_value("huber")
+    expect(named(page, "/calibrate/sensors/1/gain")).to_have_value("1.02")
     page.goto(f"/nights/new?study={example}")
     expect(page.locator(OFFER)).to_have_count(0)
     named(page, "name").fill("Half a na")
