@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -13,8 +13,9 @@ from sprag_study.worker.planning.calibrate.answer import Answer, Direction
 from sprag_study.worker.planning.calibrate.lack_of_fit import CHANCE, Offset
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
+    from sprag_study.service.reading.reader import Reading
     from sprag_study.service.results.calibration import Calibration
 
 
@@ -25,6 +26,8 @@ _DOUBTS: Final = 3
 _CHANCE: Final = 0.01
 #: Part of the squares of the residuals that an offset has to take where the rest is no chance.
 _MOST_OF: Final = 0.9
+#: Standard deviations on both sides of an offset between which it is fitted.
+_OFFSET_DEVIATIONS: Final = 5.0
 #: Standard deviations from which on a point is named.
 _FAR: Final = 4.0
 #: Share of refits that may end before they converge without a word.
@@ -109,6 +112,38 @@ def advised(found: Calibration) -> Offset | None:
     offset = min(found.answer.offsets if found.answer else (), key=lambda one: one.p, default=None)
     explains = offset is not None and (offset.rest >= _CHANCE or offset.share >= _MOST_OF)
     return offset if explains and offset is not None and offset.p < _CHANCE else None
+
+
+class Advice(NamedTuple):
+    """A further calibration with sensors as `sensors` of a spec has them, and what leads there."""
+
+    label: Phrase
+    sensors: list[dict[str, Any]]
+
+
+def further(found: Calibration, sensors: Sequence[Mapping[str, Any]], reading: Reading) -> Advice | None:
+    """The calibration that fits the offset which the answer advises, too, beside the ``sensors`` that it has.
+
+    None where none is advised. The ends of its range are in the units of the reader.
+    """
+    offset = advised(found)
+    if offset is None:
+        return None
+    result = found.plan.results[offset.column]
+    unit = found.infos[result].unit
+    far = max(abs(offset.value), _OFFSET_DEVIATIONS * offset.deviation)
+    shown = "" if reading.unit(unit) == "1" else f" {reading.unit(unit)}"
+    ends = {
+        name: f"{reading.value(end, unit):.3g}{shown}"
+        for name, end in (("from", offset.value - far), ("to", offset.value + far))
+    }
+    known = next((dict(one) for one in sensors if one["result"] == result), {"result": result})
+    label = Phrase(
+        "Calibrate again with an offset of {name} near {offset}",
+        name=Name(result, within=True),
+        offset=Amount(offset.value, unit, 3, form=".3g"),
+    )
+    return Advice(label, [*(dict(one) for one in sensors if one["result"] != result), {**known, "offset": ends}])
 
 
 def _shifted(found: Calibration) -> Iterator[Phrase]:

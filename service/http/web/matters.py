@@ -24,6 +24,7 @@ from sprag_study.service.http.threads import in_thread
 from sprag_study.service.http.views import study_address
 from sprag_study.service.http.web.figures.drawn import cases_of
 from sprag_study.service.http.web.form import calibration
+from sprag_study.service.http.web.form.check import place_faults
 from sprag_study.service.http.web.form.parts import reshape
 from sprag_study.service.http.web.form.values import Form
 from sprag_study.service.http.web.good_drives import (
@@ -240,8 +241,8 @@ async def send_points(context: Ctx, work: Attended, values: Form) -> Response:
     try:
         record = await work.submit(checks.new_study, Body(json.dumps(spec).encode()))
     except FaultError as error:
-        faults = calibration.faults_of(form, error.faults or (Fault(None, "conflict", error.detail),))
-        return await answered(work, study_id, "measurement", values, faults, api_error(error).type.status)
+        place_faults(form, error.faults or (Fault(None, "conflict", error.detail),))
+        return await answered(work, study_id, "measurement", values, form.faults, api_error(error).type.status)
     return RedirectResponse(f"/studies/{record.id}", status_code=303)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -204,14 +204,7 @@ def check_form(
     try:
         found.parsed = parse_spec(complete(spec))
     except SpecError as error:
-        for item in error.faults:
-            name = _beside(form.field_of(item.where or ""), values.get("edited", ""))
-            # Faults of unreadable data were reported already, line by line.
-            if not (name in faults and name.endswith("/data")):
-                texts = found.faults.setdefault(name, [])
-                # One field can stand for several places of the spec, as the value of a parameter at all points does.
-                text = (step_of(item.where or "") or element_of(item.where or "")) + message(item)
-                texts += [text] if text not in texts else []
+        place_faults(form, error.faults)
     if values.get(COLUMNS, "").strip() and "axes" in spec:
         found.faults[COLUMNS] = [_("has columns that are not used yet; make axes of them, or empty the field")]
     if found.faults:
@@ -225,6 +218,18 @@ def check_form(
         fit = fit_at(found.spec, None if found.parsed is None else found.parsed.study, pointer)
         found.fits |= {} if fit is None else {pointer: fit}
     return found
+
+
+def place_faults(form: Filled, found: Iterable[Fault]) -> None:
+    """Add the faults of a spec to those of the form that it was made of, each beside its field."""
+    for item in found:
+        name = _beside(form.field_of(item.where or ""), form.values.get("edited", ""))
+        # Faults of unreadable data were reported already, line by line.
+        if not (name in form.faults and name.endswith("/data")):
+            texts = form.faults.setdefault(name, [])
+            # One field can stand for several places of the spec, as the value of a parameter at all points does.
+            text = (step_of(item.where or "") or element_of(item.where or "")) + message(item)
+            texts += [text] if text not in texts else []
 
 
 def _beside(name: str, edited: str) -> str:

@@ -146,16 +146,32 @@ def _axis_text(item: Mapping[str, Any]) -> Values:
 
 
 def _variable_values(form: Filled) -> dict[str, Any]:
-    written = _range_of(form)
-    if written is None or written.count is not None or written.step or written.spacing != "even":
-        return {"values": form.listed("values")}
-    return dict(zip(("from", "to"), form.together([written.first, written.last], ["values"] * 2), strict=True))
+    return _ends(form, "values") or {"values": form.listed("values")}
 
 
 def _variable_text(item: Mapping[str, Any]) -> Values:
-    if "values" in item:
-        return {"values": list_text(item["values"])}
-    return {"values": TypedRange(text_of(item["from"]), text_of(item["to"])).text}
+    return {"values": list_text(item["values"]) if "values" in item else _ends_text(item)}
+
+
+def _ends(form: Filled, name: str) -> dict[str, Any]:
+    """The ends of the range that a field has; none where it has anything else, such as a range with a step."""
+    written = typed_range(form.text(name))
+    if written is None or written.count is not None or written.step or written.spacing != "even":
+        return {}
+    return dict(zip(("from", "to"), form.together([written.first, written.last], [name] * 2), strict=True))
+
+
+def _ends_text(item: Mapping[str, Any]) -> str:
+    return TypedRange(text_of(item["from"]), text_of(item["to"])).text
+
+
+def number_or_range(name: str) -> Cell:
+    """An entry that is a number, or a range from one to another, in one field."""
+    return Cell(
+        (name,), (name,),
+        lambda form: {name: _ends(form, name) or plain(form.text(name))} if form.text(name) else {},
+        lambda item: {name: _ends_text(given) if isinstance(given := item.get(name, ""), Mapping) else text_of(given)},
+    )  # fmt: skip
 
 
 def _refined_results(text: str) -> list[Any]:
