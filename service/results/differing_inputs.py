@@ -225,6 +225,13 @@ def _asked(one: ReadStudy) -> _Cells:
         errors = [_error_of(study, reading, name, bound) for name, bound in refined.errors.items()]
         text = "; ".join([share, *errors])
         yield "refine.error", _Cell(_("Largest error"), text if errors else refined.error, text)
+        included = {axis.paths[0]: axis.include for axis in refined.adaptive if axis.include}
+        text = "; ".join(
+            f"{reading.caption(path)} {reading.quantity(value, unit_of(study, path), _DIGITS)}"
+            for path, values in included.items() for value in values
+        )  # fmt: skip
+        if included:
+            yield "refine.include", _Cell(_("Included values"), text, text)
     elif study.kind == CALIBRATE:
         values = sum(len(own.values) for own in plan_of(study).measured)
         csv = one.spec["calibrate"]["measured"]["csv"]

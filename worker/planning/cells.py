@@ -99,6 +99,7 @@ def tree(samples: Samples, scales: Floats) -> Tree:
         wide = np.maximum(cells.width, cells.height) > samples.plan.finest // _DIVIDED
         passed = tested & (largest <= np.where(wide, 0.5 * error, error))
         passed &= (largest <= error / _SHRINKS) | (cells.worst <= error * _SHRINKS)
+        passed &= (misses(samples, scales, cells)[1] <= error) | (np.maximum(cells.width, cells.height) == 1)
         split = tested & ~passed
         leaves.append(cells[~split])
         states.append(tested[~split])
@@ -166,6 +167,39 @@ def _difference(
     return np.where(np.isfinite(raw), raw, np.inf), less.max(axis=1)
 
 
+def misses(samples: Samples, scales: Floats, cells: Cells) -> tuple[Floats, Floats]:
+    """How far included points are from the surface over each cell: (cells, results), and the largest that more points
+    make smaller, (cells,); as of `Samples.misses`, 0 without such points.
+    """
+    plan = samples.plan
+    raw, worst = np.zeros((len(cells), len(plan.results))), np.zeros(len(cells))
+    if not plan.included_points:
+        return raw, worst
+    at = np.nonzero(samples.known)
+    named = [np.isin(own, axis.included(plan.finest)) for own, axis in zip(at[1:], plan.adaptive, strict=True)]
+    at = tuple(own[np.logical_or.reduce(named)] for own in at)
+    steps = [
+        (axis.at(own, plan.finest) - axis.low) / (axis.high - axis.low) * plan.finest
+        for own, axis in zip(at[1:], plan.adaptive, strict=True)
+    ]
+    left, lower, right, upper = cells.bounds().T[:, :, None]
+    inside = (cells.map[:, None] == at[0]) & (left <= steps[0]) & (steps[0] <= right)
+    cell, point = np.nonzero(inside & (lower <= steps[1]) & (steps[1] <= upper))
+    if not cell.size:
+        return raw, worst
+    place = tuple(own[point] for own in at)
+    parts = (
+        (steps[0][point] - cells.low_x[cell]) / cells.width[cell],
+        (steps[1][point] - cells.low_y[cell]) / cells.height[cell],
+    )
+    expected = surface(stencils(samples, cells), cell, parts[0][:, None], parts[1][:, None])
+    beside = np.maximum.reduce([samples.widths[corner] for corner in cells.corners()])[cell]
+    own, less = samples.misses(place, expected, scales[place[0]], beside)
+    np.maximum.at(raw, cell, own)
+    np.maximum.at(worst, cell, less.max(axis=1))
+    return raw, worst
+
+
 def _halved(cells: Cells, worst: Floats, largest: Floats) -> Cells:
     """Both halves of cells, along the axis of the larger difference; of equal ones, along the longer side."""
     equal = worst[:, 0] == worst[:, 1]
@@ -178,3 +212,38 @@ def _halved(cells: Cells, worst: Floats, largest: Floats) -> Cells:
 
 def _together(parts: list[Cells]) -> Cells:
     return Cells(*(np.concatenate([getattr(part, name) for part in parts]) for name in Cells.__dataclass_fields__))
+
+
+def stencils(samples: Samples, cells: Cells) -> Floats:
+    """Values of cells at three times three places, shape (cells, 3, 3, results).
+
+    A midpoint that is not known lies on the straight line. The centre is that of the surface that the edges span
+    (Coons): exact for sums of a function of x and one of y and of their product's bilinear part.
+    """
+    found = np.empty((len(cells), 3, 3, samples.values.shape[-1]))
+    for place, (i, j) in zip(cells.corners(), ((0, 0), (2, 0), (0, 2), (2, 2)), strict=True):
+        found[:, i, j] = samples.values[place]
+    for axis, size in enumerate((cells.width, cells.height)):
+        for place, end in zip(cells.middles(axis), (0, 2), strict=True):
+            start, stop = ((0, end), (2, end)) if axis == 0 else ((end, 0), (end, 2))
+            middle = (1, end) if axis == 0 else (end, 1)
+            line = 0.5 * (found[:, *start] + found[:, *stop])
+            known = (size > 1) & samples.known[place]
+            found[:, *middle] = np.where(known[:, None], samples.values[place], line)
+    edges = found[:, 0, 1] + found[:, 2, 1] + found[:, 1, 0] + found[:, 1, 2]
+    corners = found[:, 0, 0] + found[:, 2, 0] + found[:, 0, 2] + found[:, 2, 2]
+    found[:, 1, 1] = 0.5 * edges - 0.25 * corners
+    return found
+
+
+def surface(values: Floats, cell: Ints, x: Floats, y: Floats) -> Floats:
+    """The surface over cells at places from 0 to 1 along each, of `stencils`, with or without the axis of results.
+
+    ``x`` and ``y`` have a last axis of length 1 where the stencils have an axis of results.
+    """
+    places = [own.reshape(cell.shape) for own in (x, y)]
+    left, lower = (np.minimum((2.0 * own).astype(np.int64), 1) for own in places)
+    u, v = 2.0 * x - left.reshape(x.shape), 2.0 * y - lower.reshape(y.shape)
+    below = (1.0 - u) * values[cell, left, lower] + u * values[cell, left + 1, lower]
+    above = (1.0 - u) * values[cell, left, lower + 1] + u * values[cell, left + 1, lower + 1]
+    return np.asarray((1.0 - v) * below + v * above)

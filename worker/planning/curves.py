@@ -78,6 +78,8 @@ class Intervals:
         Indices into `REASONS`, meaningful where there is a jump.
     worth : float64 array, shape (intervals,)
         How much a point in the middle is worth: the larger the more.
+    nodes : bool array, shape (curves, finest + 1)
+        The points between which the intervals lie, as of `_nodes`.
     """
 
     curve: Ints
@@ -88,6 +90,7 @@ class Intervals:
     jumps: Bools
     why: Ints
     worth: Floats
+    nodes: Bools
 
 
 @dataclass(frozen=True)
@@ -105,14 +108,15 @@ class _Triples:
 def intervals(samples: Samples) -> Intervals:
     """The intervals of all curves."""
     plan, scales = samples.plan, samples.scales()
-    triples = _all_triples(samples, scales)
-    curve, place = np.nonzero(samples.known)
+    nodes = _nodes(samples)
+    triples = _all_triples(samples, scales, nodes)
+    curve, place = np.nonzero(nodes)
     inner = np.flatnonzero(curve[1:] == curve[:-1])
     curve, low, width = curve[inner], place[inner], place[inner + 1] - place[inner]
     if not len(curve):
         none = np.zeros((0, len(plan.results)))
         nothing = np.zeros(0, dtype=bool)
-        return Intervals(curve, low, width, nothing, none, none > 0.0, curve, np.zeros(0))
+        return Intervals(curve, low, width, nothing, none, none > 0.0, curve, np.zeros(0), nodes)
     raw, worst = _of_ancestor(triples, curve, low, 2 * width)
     _, before = _of_ancestor(triples, curve, low, 4 * width)
     most = max(1, plan.finest // (plan.start - 1) // _DIVIDED)
@@ -121,9 +125,13 @@ def intervals(samples: Samples) -> Intervals:
     tolerance = error if plan.regime else error / _SHRINKS
     passed = (worst <= tolerance) & ((worst <= tolerance / _SHRINKS) | (before <= tolerance * _SHRINKS))
     passed &= width <= most
+    within = _within(samples, scales, nodes, curve, low, width)
+    passed &= within.worst <= tolerance
     resolved = passed | (width == 1)
     jumps, bends = _jumps(samples, scales, curve, low, width, passed)
+    jumps |= (within.raw > error) & ~passed[:, None]
     errors = np.where(width[:, None] == 1, np.where(np.isnan(bends), raw, bends), raw)
+    errors = np.maximum(errors, within.raw)
     both = samples.irregular[curve, low] & samples.irregular[curve, low + width]
     # What passed only because it scatters.
     scattered = passed[:, None] & (errors > error)
@@ -131,24 +139,98 @@ def intervals(samples: Samples) -> Intervals:
     reported = _without_gaps(curve * 2 * (plan.finest + most) + low, width, own, most)
     reported |= (sensitive(samples, curve, low, width) & (~passed | (width == 1)))[:, None]
     reported = _with_beside(reported, weak(samples, curve, low, width)[:, None], (curve[1:] == curve[:-1])[:, None])
-    why = _reasons(samples, curve, low, width, both, np.asarray(jumps.any(axis=1)))
-    worth = np.where(width > plan.finest // (plan.start - 1), 2.0 * width, np.minimum(worst, 1.0))
-    return Intervals(curve, low, width, resolved, errors, reported, why, worth)
+    why = _reasons(samples, curve, low, width, both, np.asarray(jumps.any(axis=1)), within)
+    worst = np.minimum(np.maximum(worst, within.worst), 1.0)
+    worth = np.where(width > plan.finest // (plan.start - 1), 2.0 * width, worst)
+    return Intervals(curve, low, width, resolved, errors, reported, why, worth, nodes)
 
 
-def _all_triples(samples: Samples, scales: Floats) -> dict[int, _Triples]:
+def _nodes(samples: Samples) -> Bools:
+    """The known points that halving has reached, shape (curves, finest + 1): an included value may be known before."""
+    plan = samples.plan
+    known = samples.known[:, : plan.finest + 1]
+    if not plan.adaptive[0].include:
+        return known
+    step = plan.finest // (plan.start - 1)
+    nodes = np.zeros_like(known)
+    nodes[:, ::step] = known[:, ::step]
+    while step > 1:
+        middles = slice(step // 2, None, step)
+        nodes[:, middles] = known[:, middles] & nodes[:, :-1:step] & nodes[:, step::step]
+        step //= 2
+    return nodes
+
+
+@dataclass(frozen=True)
+class _Within:
+    """What points within intervals say that are no ends of one.
+
+    ``raw`` (intervals, results) are the largest distances from the straight line, ``worst`` (intervals,) is the largest
+    that more points make smaller, infinite where a motion differs from those at the ends. The others (intervals,) are
+    whether a case failed, whether a result is missing, and whether regime and order differ from one of the ends.
+    """
+
+    raw: Floats
+    worst: Floats
+    failed: Bools
+    missing: Bools
+    regime: Bools
+    order: Bools
+
+
+def _within(samples: Samples, scales: Floats, nodes: Bools, curve: Ints, low: Ints, width: Ints) -> _Within:
+    """`_Within` of all intervals; 0 and False without such points."""
+    plan = samples.plan
+    raw, worst = np.zeros((len(curve), len(plan.results))), np.zeros(len(curve))
+    tests = [np.zeros(len(curve), dtype=bool) for _ in range(4)]
+    inside = samples.known.copy()
+    inside[:, : plan.finest + 1] &= ~nodes
+    at = np.nonzero(inside)
+    if not at[0].size:
+        return _Within(raw, worst, *tests)
+    axis = plan.adaptive[0]
+    steps = (axis.at(at[1], plan.finest) - axis.low) / (axis.high - axis.low) * plan.finest
+    # Curves one behind the other.
+    length = plan.finest + 1
+    number = np.searchsorted(curve * length + low, at[0] * length + steps, side="right") - 1
+    held = (number >= 0) & (curve[number] == at[0]) & (steps <= (low + width)[number])
+    at, steps, number = (at[0][held], at[1][held]), steps[held], number[held]
+    start, end = ((curve[number], low[number] + own) for own in (0, width[number]))
+    part = ((steps - low[number]) / width[number])[:, None]
+    line = (1.0 - part) * samples.values[start] + part * samples.values[end]
+    misses, less = samples.misses(at, line, scales[at[0]], np.maximum(samples.widths[start], samples.widths[end]))
+    codes = samples.codes
+    same = (codes[at] == codes[start]) & (codes[at] == codes[end])
+    np.maximum.at(raw, number, misses)
+    np.maximum.at(worst, number, np.where(same, less.max(axis=1), np.inf))
+    regimes, orders = samples.regimes, samples.orders
+    for test, own in zip(
+        tests,
+        (
+            ~samples.ok[at],
+            ~np.isfinite(samples.values[at]).all(axis=1),
+            (regimes[at] != regimes[start]) | (regimes[at] != regimes[end]),
+            (orders[at] != orders[start]) | (orders[at] != orders[end]),
+        ),
+        strict=True,
+    ):
+        np.logical_or.at(test, number, own)
+    return _Within(raw, worst, *tests)
+
+
+def _all_triples(samples: Samples, scales: Floats, nodes: Bools) -> dict[int, _Triples]:
     """`_Triples` by the length of the interval."""
     found: dict[int, _Triples] = {}
     length = samples.plan.finest
     while length >= 2:
-        found[length] = _triples(samples, scales, length)
+        found[length] = _triples(samples, scales, nodes, length)
         length //= 2
     return found
 
 
-def _triples(samples: Samples, scales: Floats, length: int) -> _Triples:
-    error, codes = samples.plan.error, samples.codes
-    ends, middles = slice(0, None, length), slice(length // 2, None, length)
+def _triples(samples: Samples, scales: Floats, nodes: Bools, length: int) -> _Triples:
+    error, codes, size = samples.plan.error, samples.codes, nodes.shape[1]
+    ends, middles = slice(0, size, length), slice(length // 2, size, length)
 
     def three(array: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
         return array[:, ends][:, :-1], array[:, middles], array[:, ends][:, 1:]
@@ -156,7 +238,7 @@ def _triples(samples: Samples, scales: Floats, length: int) -> _Triples:
     left, middle, right = three(samples.values)
     with np.errstate(invalid="ignore"):
         raw = np.abs(middle - 0.5 * (left + right)) / scales[:, None, :]
-    known = np.logical_and.reduce(three(samples.known))
+    known = np.logical_and.reduce(three(nodes))
     raw = np.where(known[:, :, None], raw, np.nan)
     width = np.maximum.reduce(three(samples.widths))
     irregular = np.logical_and.reduce(three(samples.irregular))
@@ -255,17 +337,19 @@ def _without_gaps(start: Ints, width: Ints, jump: Bools, narrow: int) -> Bools:
     return np.asarray(after - before <= narrow)
 
 
-def _reasons(samples: Samples, curve: Ints, low: Ints, width: Ints, irregular: Bools, steep: Bools) -> Ints:
+def _reasons(
+    samples: Samples, curve: Ints, low: Ints, width: Ints, irregular: Bools, steep: Bools, within: _Within
+) -> Ints:
     """Indices into `REASONS`; ``steep`` (intervals,) are those in which a result itself jumps or is too steep."""
     high = low + width
     missing = ~np.isfinite(samples.values[curve, low]) | ~np.isfinite(samples.values[curve, high])
     regimes, orders = samples.regimes, samples.orders
     tests = {
-        Why.FAILED: ~samples.ok[curve, low] | ~samples.ok[curve, high],
+        Why.FAILED: ~samples.ok[curve, low] | ~samples.ok[curve, high] | within.failed,
         Why.IRREGULAR: irregular,
-        Why.REGIME: steep & (regimes[curve, low] != regimes[curve, high]),
-        Why.ORDER: steep & (orders[curve, low] != orders[curve, high]),
-        Why.NO_VALUE: missing.any(axis=1),
+        Why.REGIME: steep & ((regimes[curve, low] != regimes[curve, high]) | within.regime),
+        Why.ORDER: steep & ((orders[curve, low] != orders[curve, high]) | within.order),
+        Why.NO_VALUE: missing.any(axis=1) | within.missing,
         Why.STEEP: steep,
     }
     fallback = REASONS.index(Why.SENSITIVE)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    Bools = NDArray[np.bool_]
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
 
@@ -29,30 +30,64 @@ MULTIPLIER, SETTLED_AFTER = "regime.multiplier", "regime.settled_after"
 _MAX_FINEST: Final = 65_536
 #: Numbers that a planner holds at most: results at every point of the finest grids.
 _MAX_NUMBERS: Final = 8_000_000
+#: Values at most that an axis includes.
+MAX_INCLUDED: Final = 16
+#: How far a value may be from a point of the grid, relative to the axis, that counts as this point.
+SAME: Final = 1e-9
 
 
 @dataclass(frozen=True)
 class AdaptiveAxis:
-    """An axis along which the planner chooses the values, from ``low`` to ``high`` (SI)."""
+    """An axis along which the planner chooses the values, from ``low`` to ``high`` (SI).
+
+    It has positions 0 .. ``finest`` on its grid. The first round also has the values of ``include``, ascending. Those
+    that are not on the grid have the positions behind it.
+    """
 
     paths: tuple[str, ...]
     low: float
     high: float
+    include: tuple[float, ...] = ()
 
     def at(self, positions: Ints, finest: int) -> Floats:
-        """Values at positions 0 .. ``finest``: those of ``numpy.linspace`` with any power of two of intervals."""
+        """Values at positions: on the grid those of ``numpy.linspace`` with any power of two of intervals."""
         values = self.low + (self.high - self.low) * positions / finest
-        return np.where(positions == finest, self.high, values)
+        values = np.where(positions == finest, self.high, values)
+        beside = self.beside(finest)
+        return (
+            np.where(positions > finest, beside[np.maximum(positions - finest - 1, 0)], values)
+            if beside.size
+            else values
+        )
 
     def positions(self, values: Floats, finest: int) -> Ints:
-        """Positions of values; ValueError for one that is not on the grid."""
-        found = np.rint((values - self.low) / (self.high - self.low) * finest)
-        valid = (found >= 0) & (found <= finest)
-        positions = np.where(valid, found, 0).astype(np.int64)
-        valid &= np.abs(self.at(positions, finest) - values) <= 1e-9 * (self.high - self.low)
+        """Positions of values; ValueError for one that is neither on the grid nor included."""
+        positions, valid = self._nearest(values, finest)
+        if beside := self.beside(finest).tolist():
+            near = np.abs(values[:, None] - beside) <= SAME * (self.high - self.low)
+            other = ~valid & near.any(axis=1)
+            positions[other] = finest + 1 + near[other].argmax(axis=1)
+            valid |= other
         if not valid.all():
             raise ValueError(f"{self.paths[0]}: {values[~valid][0]} is not a point of this refinement")
         return positions
+
+    def beside(self, finest: int) -> Floats:
+        """The included values that are not on the grid."""
+        values = np.array(self.include)
+        return values[~self._nearest(values, finest)[1]]
+
+    def included(self, finest: int) -> Ints:
+        """Positions of the included values."""
+        return self.positions(np.array(self.include), finest)
+
+    def _nearest(self, values: Floats, finest: int) -> tuple[Ints, Bools]:
+        """The nearest positions on the grid, and whether the values are there."""
+        found = np.rint((values - self.low) / (self.high - self.low) * finest)
+        valid = (found >= 0) & (found <= finest)
+        positions = np.where(valid, found, 0).astype(np.int64)
+        grid = np.where(positions == finest, self.high, self.low + (self.high - self.low) * positions / finest)
+        return positions, valid & (np.abs(grid - values) <= SAME * (self.high - self.low))
 
 
 @dataclass(frozen=True)
@@ -140,11 +175,19 @@ class RefinePlan:
             allowed = "finite numbers, the first below the second"
             valid = math.isfinite(axis.low) and math.isfinite(axis.high) and axis.low < axis.high
             _check(valid, f"adaptive {axis.paths[0]}", [axis.low, axis.high], allowed)
+            name, listed = f"include {axis.paths[0]}", list(axis.include)
+            _check(len(listed) <= MAX_INCLUDED, name, len(listed), f"at most {MAX_INCLUDED} values")
+            _check(
+                all(axis.low <= value <= axis.high for value in listed), name, listed, "between the ends of the axis"
+            )
+            _check(listed == sorted(set(listed)), name, listed, "different values, ascending")
         for fixed in self.fixed:
             _check(bool(fixed.values), f"fixed {fixed.paths[0]}", [], "at least one value")
             different = len(set(fixed.values)) == len(fixed.values)
             _check(different, f"fixed {fixed.paths[0]}", list(fixed.values), "different values")
-        numbers = self.combinations * self.grid_points * len(self.results)
+        named = self.combinations * self.included_points
+        _check(self.most is None or self.most >= named, "most", self.most, f"at least {named}, the included values")
+        numbers = self.combinations * math.prod(self.sizes) * len(self.results)
         allowed = Sentence(
             "at most {most} for all points of the finest grids and all results, not {numbers}",
             most=_MAX_NUMBERS,
@@ -157,7 +200,10 @@ class RefinePlan:
         """The plan from plain JSON data; the inverse of `to_json`."""
         if data.get("kind") != REFINE:
             raise ValueError(f"kind: {data.get('kind')!r} is not {REFINE!r}")
-        adaptive = [AdaptiveAxis(tuple(a["paths"]), float(a["low"]), float(a["high"])) for a in data["adaptive"]]
+        adaptive = [
+            AdaptiveAxis(tuple(a["paths"]), float(a["low"]), float(a["high"]), tuple(map(float, a.get("include", ()))))
+            for a in data["adaptive"]
+        ]
         fixed = [FixedAxis(tuple(a["paths"]), tuple(map(float, a["values"]))) for a in data.get("fixed", ())]
         most = data.get("most")
         return cls(
@@ -182,7 +228,11 @@ class RefinePlan:
             "start": self.start,
             "finest": self.finest,
             "most": self.most,
-            "adaptive": [{"paths": list(a.paths), "low": a.low, "high": a.high} for a in self.adaptive],
+            "adaptive": [
+                {"paths": list(a.paths), "low": a.low, "high": a.high}
+                | ({"include": list(a.include)} if a.include else {})
+                for a in self.adaptive
+            ],
             "fixed": [{"paths": list(a.paths), "values": list(a.values)} for a in self.fixed],
             "regime": self.regime,
             "half_widths": list(self.half_widths),
@@ -218,8 +268,34 @@ class RefinePlan:
 
     @property
     def grid_points(self) -> int:
-        """Points of the finest grid of one curve or map."""
-        return math.prod(self.finest + 1 for _ in self.adaptive)
+        """Points of the finest grid of one curve or map, and those of the first round that are not on it."""
+        beside = [int((own > self.finest).sum()) for own in self.first]
+        whole = math.prod(len(own) for own in self.first)
+        on_grid = math.prod(len(own) - count for own, count in zip(self.first, beside, strict=True))
+        return math.prod(self.finest + 1 for _ in self.adaptive) + whole - on_grid
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Positions of each adaptive axis: those of its grid, and of included values beside it."""
+        return tuple(self.finest + 1 + axis.beside(self.finest).size for axis in self.adaptive)
+
+    @cached_property
+    def first(self) -> tuple[Ints, ...]:
+        """Positions of the first round on each adaptive axis: ``start`` even ones, then the other included ones."""
+        even = np.arange(self.start, dtype=np.int64) * (self.finest // (self.start - 1))
+        included = [np.unique(axis.included(self.finest)) for axis in self.adaptive]
+        return tuple(np.concatenate([even, own[~np.isin(own, even)]]) for own in included)
+
+    @property
+    def included_points(self) -> int:
+        """Points of the first round of one curve or map with an included value."""
+        if not any(axis.include for axis in self.adaptive):
+            return 0
+        others = [
+            len(own) - len(np.unique(axis.included(self.finest)))
+            for own, axis in zip(self.first, self.adaptive, strict=True)
+        ]
+        return math.prod(len(own) for own in self.first) - math.prod(others)
 
     @cached_property
     def _grid(self) -> Floats:

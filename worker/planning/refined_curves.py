@@ -161,6 +161,11 @@ def _curve(
 ) -> Curve:
     plan = samples.plan
     places = np.flatnonzero(samples.known[index])
+    places = places[np.argsort(plan.adaptive[0].at(places, plan.finest), kind="stable")]
+    # The interval that holds each part between two points; the last one, without a line, stands for none.
+    ends = np.append(own.nodes[index], np.zeros(1, dtype=bool))[np.minimum(places, plan.finest + 1)]
+    held = (np.cumsum(ends) - 1)[:-1]
+    broken = np.vstack([own.jumps[part], np.ones((1, len(plan.results)), dtype=bool)])[held]
     # Relative to the ranges instead of the scales; exactly the same for a result without an error of its own.
     values, errors = samples.values[index, places], own.errors[part] * (shares / plan.error)
     passed = len(places) > 1 and bool(own.resolved[part].all())
@@ -169,7 +174,7 @@ def _curve(
         x=plan.adaptive[0].at(places, plan.finest),
         ok=samples.ok[index, places],
         values={name: values[:, k] for k, name in enumerate(plan.results)},
-        joined={name: ~own.jumps[part][:, k] for k, name in enumerate(plan.results)},
+        joined={name: ~broken[:, k] for k, name in enumerate(plan.results)},
         errors={
             name: _largest_of(errors[~jumps[:, k], k], passed) if np.isfinite(values[:, k]).any() else None
             for k, name in enumerate(plan.results)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sprag_study.worker.planning.cells import Cells, Tree, tree
+from sprag_study.worker.planning.cells import Cells, Tree, misses, stencils, surface, tree
 from sprag_study.worker.planning.refiner import Described, Refiner
 from sprag_study.worker.planning.samples import Samples
 
@@ -66,7 +66,7 @@ class Map(Described):
     @cached_property
     def _stencils(self) -> Floats:
         """Values at three times three places of each cell, shape (cells, 3, 3, results); the first axis is x."""
-        return _stencils(self._samples, self._own)
+        return stencils(self._samples, self._own)
 
     @cached_property
     def _owners(self) -> Ints:
@@ -90,13 +90,9 @@ class Map(Described):
         if not len(self.cells):
             return np.full(np.shape(x), np.nan)
         low, high = self.cells[cell, :2], self.cells[cell, 2:]
-        parts = [2.0 * np.clip((own - low[..., n]) / (high - low)[..., n], 0.0, 1.0) for n, own in enumerate((x, y))]
-        left, lower = (np.minimum(part.astype(np.int64), 1) for part in parts)
-        u, v = parts[0] - left, parts[1] - lower
-        own = self._stencils[..., k]
-        below = (1.0 - u) * own[cell, left, lower] + u * own[cell, left + 1, lower]
-        above = (1.0 - u) * own[cell, left, lower + 1] + u * own[cell, left + 1, lower + 1]
-        return np.where((owner < 0) | self.jumps[name][cell], np.nan, (1.0 - v) * below + v * above)
+        parts = [np.clip((own - low[..., n]) / (high - low)[..., n], 0.0, 1.0) for n, own in enumerate((x, y))]
+        values = surface(self._stencils[..., k], cell, parts[0], parts[1])
+        return np.where((owner < 0) | self.jumps[name][cell], np.nan, values)
 
     @property
     def jumps_share(self) -> dict[str, float]:
@@ -194,6 +190,8 @@ def _judged(samples: Samples, own: Tree) -> tuple[Floats, Bools]:
         errors = np.fmax(errors, estimate)
         # While a cell is open, only what rises may be a jump.
         jumps |= (estimate > error) & (own.resolved[:, None] | (rise > error))
+    within, _ = misses(samples, samples.scales(), cells)
+    errors, jumps = np.fmax(errors, within), jumps | (within > error)
     missing = ~np.isfinite(corners).all(axis=0)
     return errors, jumps | missing | (widths > error * scales)
 
@@ -243,25 +241,3 @@ def _map(
 def _largest_of(errors: Floats) -> float | None:
     highest = float(errors.max(initial=0.0))
     return highest if np.isfinite(highest) else None
-
-
-def _stencils(samples: Samples, cells: Cells) -> Floats:
-    """Values of cells at three times three places, shape (cells, 3, 3, results).
-
-    A midpoint that is not known lies on the straight line. The centre is that of the surface that the edges span
-    (Coons): exact for sums of a function of x and one of y and of their product's bilinear part.
-    """
-    found = np.empty((len(cells), 3, 3, samples.values.shape[-1]))
-    for place, (i, j) in zip(cells.corners(), ((0, 0), (2, 0), (0, 2), (2, 2)), strict=True):
-        found[:, i, j] = samples.values[place]
-    for axis, size in enumerate((cells.width, cells.height)):
-        for place, end in zip(cells.middles(axis), (0, 2), strict=True):
-            start, stop = ((0, end), (2, end)) if axis == 0 else ((end, 0), (end, 2))
-            middle = (1, end) if axis == 0 else (end, 1)
-            line = 0.5 * (found[:, *start] + found[:, *stop])
-            known = (size > 1) & samples.known[place]
-            found[:, *middle] = np.where(known[:, None], samples.values[place], line)
-    edges = found[:, 0, 1] + found[:, 2, 1] + found[:, 1, 0] + found[:, 1, 2]
-    corners = found[:, 0, 0] + found[:, 2, 0] + found[:, 0, 2] + found[:, 2, 2]
-    found[:, 1, 1] = 0.5 * edges - 0.25 * corners
-    return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -49,7 +50,7 @@ class Refiner(ABC):
         self.results = plan.needed
         self.most_cases = plan.most_cases
         # Each round after the first has a case at least.
-        later = max(0, plan.most_cases - plan.combinations * plan.start**self.dimensions)
+        later = max(0, plan.most_cases - plan.combinations * math.prod(len(own) for own in plan.first))
         halvings = (plan.finest // (plan.start - 1)).bit_length() - 1
         self.most_rounds = 1 + min(self.rounds_per_halving * halvings, later)
         self.rounds = 0
@@ -92,13 +93,17 @@ class Refiner(ABC):
         return combinations[:left], [own[:left] for own in positions]
 
     def _first(self) -> Places:
-        """The first round: the ends of all axes, their middles, and so on."""
+        """The first round: the included values, then the ends of all axes, their middles, and so on."""
         plan = self.plan
-        at = np.indices((plan.combinations, *(plan.start for _ in plan.adaptive))).reshape(1 + self.dimensions, -1)
-        passes = levels(plan.start)[at[1:]].max(axis=0)
-        order = np.lexsort((*at[:0:-1], at[0], passes))[: self.most_cases]
+        at = np.indices((plan.combinations, *(len(own) for own in plan.first))).reshape(1 + self.dimensions, -1)
+        passes, included = np.zeros(at.shape[1], dtype=np.int64), np.zeros(at.shape[1], dtype=bool)
+        for own, first, axis in zip(at[1:], plan.first, plan.adaptive, strict=True):
+            own_passes = np.append(levels(plan.start), np.zeros(len(first) - plan.start, dtype=np.int64))
+            passes = np.maximum(passes, own_passes[own])
+            included |= np.isin(first, axis.included(plan.finest))[own]
+        order = np.lexsort((*at[:0:-1], at[0], np.where(included, -1, passes)))[: self.most_cases]
         combinations, *positions = at[:, order].astype(np.int64)
-        return combinations, [own * (plan.finest // (plan.start - 1)) for own in positions]
+        return combinations, [first[own] for first, own in zip(plan.first, positions, strict=True)]
 
     def _summary(self) -> dict[str, Any]:
         every, known = self.described(), self.samples.known

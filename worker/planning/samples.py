@@ -48,7 +48,7 @@ class Samples:
     ----------
     known, ok, irregular : bool arrays, shape (combinations, places...)
         Where there is a row, whether it has results, and whether its motion is irregular; one dimension of places for
-        each adaptive axis, ``finest + 1`` long.
+        each adaptive axis, as long as the plan's ``sizes``.
     values, widths : float64 arrays, shape (combinations, places..., results)
         Results (NaN where there is none) and their half widths (0 where there is none).
     regimes, orders : float64 arrays, shape (combinations, places...)
@@ -62,7 +62,7 @@ class Samples:
     """
 
     def __init__(self, plan: RefinePlan) -> None:
-        shape = (plan.combinations, *(plan.finest + 1 for _ in plan.adaptive))
+        shape = (plan.combinations, *plan.sizes)
         self.plan = plan
         self.known = np.zeros(shape, dtype=bool)
         self.ok = np.zeros(shape, dtype=bool)
@@ -104,6 +104,21 @@ class Samples:
     def codes(self) -> Floats:
         """One number for each kind of motion: equal where regime and order are."""
         return self.regimes * 1e6 + self.orders
+
+    def misses(self, at: tuple[Ints, ...], expected: Floats, scales: Floats, beside: Floats) -> tuple[Floats, Floats]:
+        """How far results are from what the points around them lead to, both of shape (points, results).
+
+        The first are the distances relative to ``scales``, infinite where only one of both has a value; the second are
+        those that more points make smaller. ``beside`` are the half widths of the points around.
+        """
+        values, error = self.values[at], self.plan.error
+        with np.errstate(invalid="ignore"):
+            raw = np.abs(values - expected) / scales
+        raw = np.where(np.isfinite(values) | np.isfinite(expected), np.where(np.isfinite(raw), raw, np.inf), 0.0)
+        # As at midpoints: a mean stops within two half widths, an extreme of irregular motion at once.
+        width = np.maximum(self.widths[at], beside)
+        scatter = np.where(self.has_width, raw * scales <= 2.0 * width, self.irregular[at][:, None])
+        return raw, np.where(scatter, np.minimum(raw, error), raw)
 
     def ranges(self) -> Floats:
         """Range of each result over each curve or map, shape (combinations, results); 1 where there is no value."""

@@ -24,6 +24,7 @@ from sprag_study.worker.directions import SWEEP
 from sprag_study.worker.limits import MAX_AXIS_VALUES, MAX_CASES, MAX_TIED_PATHS
 from sprag_study.worker.models import Parameter
 from sprag_study.worker.models.parameters import in_range
+from sprag_study.worker.planning.refine_plan import MAX_INCLUDED
 from sprag_study.worker.study import Axis, Combine
 
 if TYPE_CHECKING:
@@ -76,10 +77,17 @@ AXIS: Final = Record(
     required=("path",),
     either=tuple(PLANS),
 )
+#: Stands among included values for the one in `base`.
+OF_BASE: Final = "base"
+_INCLUDE: Final = (
+    "values between the ends that the first round has in any case, of a map with the values of the other axis in that "
+    f'round; "{OF_BASE}" stands for the value in `base`'
+)
 ADAPTIVE: Final = Record(
     {
         "path": PATHS,
         "adaptive": _row("[from, to]: the values between them are chosen by `refine`", QUANTITY, QUANTITY),
+        "include": Listed("values", 1, MAX_INCLUDED, _INCLUDE, item=QUANTITY),
     },
     required=("path", "adaptive"),
 )

@@ -5,19 +5,22 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
-from sprag_study.sentences import Sentence, plural
-from sprag_study.service.spec.axes.axes import ADAPTIVE, axis_values, check_paths
+from sprag_study.sentences import Amount, Sentence, plural
+from sprag_study.service.languages import N_
+from sprag_study.service.spec.axes.axes import ADAPTIVE, OF_BASE, axis_values, check_paths
 from sprag_study.service.spec.axes.design import AXES
 from sprag_study.service.spec.described import Described, Listed, Record
 from sprag_study.service.spec.kinds.draft import Kind
 from sprag_study.service.spec.kinds.fields import RESULT, read_ends, read_numeric_result, read_path_of, read_value
+from sprag_study.service.spec.lists import read_list
 from sprag_study.service.spec.shares import in_percent
 from sprag_study.worker.errors import WrongPlanError
 from sprag_study.worker.limits import MAX_PLANNED_CASES
 from sprag_study.worker.models import regime_info
-from sprag_study.worker.planning.refine_plan import AdaptiveAxis, ErrorBound, FixedAxis, RefinePlan
+from sprag_study.worker.planning.refine_plan import SAME, AdaptiveAxis, ErrorBound, FixedAxis, RefinePlan
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -136,7 +139,46 @@ def _adaptive(item: Node) -> AdaptiveAxis | None:
     if paths is None:
         return None
     ends = read_ends(node, paths, node.parts())
-    return None if ends is None else AdaptiveAxis(paths, *ends)
+    included = _included(item, paths, *ends) if ends and "include" in item else ()
+    return None if ends is None or included is None else AdaptiveAxis(paths, *ends, included)
+
+
+def _included(item: Node, paths: tuple[str, ...], low: float, high: float) -> tuple[float, ...] | None:
+    """The values that an axis includes (SI, ascending); None, and the faults recorded, where one is wrong."""
+    nodes = ADAPTIVE.items(item, "include")
+    parameters = [item.machine.parameters[path] for path in paths]
+    unit = parameters[0].unit
+    given = [node for node in nodes if node.value != OF_BASE]
+    if not nodes or (given and read_list(given, unit, paths[0]) is None):
+        return None
+    values: list[float] = []
+    for node in nodes:
+        value = _of_base(node, paths) if node.value == OF_BASE else node.number_in(parameters)
+        if value is None:
+            continue
+        ends = {"low": Amount(low, unit, 10), "high": Amount(high, unit, 10)}
+        if not low <= value <= high:
+            node.refuse("out-of-range", "is not between the ends of the axis", _shown(node, value),
+                        allowed=Sentence("{low} to {high}", **ends), unit=unit)  # fmt: skip
+        elif any(abs(value - other) <= SAME * (high - low) for other in values):
+            node.refuse("repeated", "is named twice", _shown(node, value), allowed="each value once", unit=unit)
+        values.append(value)
+    return tuple(sorted(values)) if item.sound else None
+
+
+def _of_base(node: Node, paths: tuple[str, ...]) -> float | None:
+    """The value of an axis in `base`; None, and a fault recorded, where its paths have several there."""
+    machine = node.machine
+    values = {machine.values[path] for path in paths if path in machine.values}
+    if len(values) > 1:
+        node.refuse("conflict", "the paths of the axis have different values in `base`",
+                    allowed=N_("a value of the axis"))  # fmt: skip
+    return values.pop() if len(values) == 1 else None
+
+
+def _shown(node: Node, value: float) -> object:
+    """A value for a fault: as it was written, or the one in `base`."""
+    return value if node.value == OF_BASE else node.value
 
 
 def _read_plan(node: Node, axes: RefinedAxes) -> RefinePlan | None:
@@ -165,11 +207,17 @@ def _read_plan(node: Node, axes: RefinedAxes) -> RefinePlan | None:
     widths = tuple(name for name in results if any(info.name == f"{name}.half_width" for info in infos))
     try:
         plan = RefinePlan(
-            tuple(results), error, start, finest, adaptive, fixed, most, regime_info(infos) is not None, widths, errors
+            tuple(results), error, start, finest, adaptive, fixed, None, regime_info(infos) is not None, widths, errors
         )
     except WrongPlanError as wrong:
         node.refuse("too-many", wrong.message, None, allowed="fewer curves, results or intervals")
         return None
+    named = plan.combinations * plan.included_points
+    if most is not None and most < named:
+        counted = plural("{count} case has an included value", "{count} cases have included values", named)
+        node["most"].refuse("out-of-range", counted, allowed=f">= {named}")
+        return None
+    plan = replace(plan, most=most)
     if plan.most_cases > MAX_PLANNED_CASES:
         node["finest"].otherwise(fields["finest"].default).refuse(
             "too-many",

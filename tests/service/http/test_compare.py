@@ -101,12 +101,14 @@ def test_inputs_are_compared_in_the_units_of_the_reader(service: Service) -> Non
 
 
 def test_errors_of_single_results_are_compared(service: Service) -> None:
-    def asking(error: str) -> str:
+    def asking(error: str, **more: object) -> str:
         items = ["efficiency", {"result": "shaft.speed.mean", "error": error}]
-        axes = [{"path": X, "adaptive": [0, "1 N*m"]}]
+        axes = [{"path": X, "adaptive": [0, "1 N*m"], **more}]
         return service.submit({**SPEC, "axes": axes, "refine": {"results": items}, "name": error})
 
-    page = service.http.get("/compare", params={"study": [asking("60 rpm"), asking("2 %")], "units": "typed"}).text
+    studies = [asking("60 rpm"), asking("2 %", include=["0.3 N*m"])]
+    page = service.http.get("/compare", params={"study": studies, "units": "typed"}).text
+    assert "<td>Load torque 0.3 N·m</td>" in page
     cells = "<td>1 %; Mean shaft speed 60 rpm</td><td>1 %; Mean shaft speed 2 %</td>"
     assert f'title="refine.error">Largest error</th>{cells}' in page
 

@@ -28,7 +28,7 @@ from sprag_study.service.http.web.form.walk import Cell, Filled, Record, Rows, c
 from sprag_study.service.languages import N_, _
 from sprag_study.service.reading.ranges import Spacing, TypedRange, typed_range
 from sprag_study.service.reading.together import with_last_unit
-from sprag_study.service.spec.axes.axes import SWEPT
+from sprag_study.service.spec.axes.axes import OF_BASE, SWEPT
 from sprag_study.service.spec.axes.sample import SAMPLE, SCALE
 from sprag_study.service.spec.component_axes import COMPONENT
 from sprag_study.service.spec.components import KINDS
@@ -131,6 +131,9 @@ def _axis_values(form: Filled) -> dict[str, Any]:
     numbers = form.together(written.numbers, ["values"] * len(written.numbers))
     counts = [] if written.count is None else [written.count]
     way = next(way for way, spacing in _SPACINGS.items() if spacing == written.spacing)
+    if way == "adaptive":
+        include = [*numbers[2:], *([OF_BASE] if written.of_base else [])]
+        return {way: numbers[:2], **({"include": include} if include else {})}
     return {"range" if written.step else way: [*numbers, *counts]}
 
 
@@ -142,7 +145,10 @@ def _axis_text(item: Mapping[str, Any]) -> Values:
     if len(more) != (way != "adaptive") or (way in ("linspace", "geomspace") and not more[0].isdecimal()):
         raise ValueError("the form has no field for this range")
     step, count = (more[0], None) if way == "range" else ("", int(more[0]) if more else None)
-    return {"values": TypedRange(first, last, step, count, _SPACINGS.get(way, "even")).text}
+    include = item.get("include", []) if way == "adaptive" else []
+    others = tuple(text_of(value) for value in include if value != OF_BASE)
+    spacing = _SPACINGS.get(way, "even")
+    return {"values": TypedRange(first, last, step, count, spacing, others, len(others) < len(include)).text}
 
 
 def _variable_values(form: Filled) -> dict[str, Any]:
@@ -436,7 +442,7 @@ RANGE: Final = Cell(
     ("from", "to"), ("from", "to"), Filled.ranged,
     lambda item: {name: text_of(item[name]) for name in ("from", "to")},
 )  # fmt: skip
-_AXIS_VALUES: Final = Cell(("values", "range", *_SPACINGS), ("values",) * 5, _axis_values, _axis_text)
+_AXIS_VALUES: Final = Cell(("values", "range", *_SPACINGS, "include"), ("values",) * 6, _axis_values, _axis_text)
 _VARIABLE_VALUES: Final = Cell(("values", "from", "to"), ("values",) * 3, _variable_values, _variable_text)
 RESULT: Final = typed("result", lambda text: text or None, str, always=True)
 _TOWARD: Final = Cell(

@@ -64,7 +64,7 @@ REFINED = changed(
     {
         "/axes": [
             {"path": "excitation.frequency", "values": [20, 25]},
-            {"path": "shaft.load", "adaptive": [0, "1.2 N*m"]},
+            {"path": "shaft.load", "adaptive": [0, "1.2 N*m"], "include": ["300 N*mm", "base"]},
         ],
         "/refine": {
             "results": [
@@ -82,7 +82,7 @@ REFINED = changed(
 
 def test_a_refined_study_is_cloned_with_all_that_it_asks_for() -> None:
     values = values_of(json.loads(json.dumps(REFINED)))
-    assert values["/axes/1/values"] == "0 to 1.2 N*m refined"
+    assert values["/axes/1/values"] == "0 to 1.2 N*m refined with 300 N*mm; base"
     again, faults = spec_of(values)
     assert faults == {}
     assert again["refine"] == REFINED["refine"]
@@ -114,6 +114,8 @@ def test_an_axis_that_is_refined_asks_for_results_and_an_error() -> None:
         ("/axes/1/values", "? to 1.2 N*m", "must begin with a number"),
         ("/axes/1/values", "0 mm to 1.2 N*m refined", "not a unit of this field"),
         ("/axes/1/values", "1.2 to 1.2 N*m refined", "begins where it ends"),
+        ("/axes/1/values", "0 to 1.2 N*m refined with 1.3", "is not between the ends of the axis"),
+        ("/axes/1/values", "0 to 1.2 N*m refined with 0.3; 0.3", "is named twice"),
     ],
 )
 def test_each_fault_of_a_refinement_stands_beside_its_field(name: str, text: str, message: str) -> None:

@@ -95,6 +95,11 @@ def test_a_row_has_one_unit(text: str, shown: str, unit: str) -> None:
         ("1 to 100 in 5 geometric", {"geomspace": ["1 rpm", "100 rpm", 5]}),
         ("20 to 60 refined", {"adaptive": ["20 rpm", "60 rpm"]}),
         ("20 до 60 з уточненням", {"adaptive": ["20 rpm", "60 rpm"]}),
+        ("20 to 60 refined with 30; base", {"adaptive": ["20 rpm", "60 rpm"], "include": ["30 rpm", "base"]}),
+        (
+            "20 до 60 з уточненням зі значеннями базове; 30,5",
+            {"adaptive": ["20 rpm", "60 rpm"], "include": ["30.5 rpm", "base"]},
+        ),
         ("0.1; 0.2; 0.5", {"values": ["0.1 rpm", "0.2 rpm", "0.5 rpm"]}),
         ("0,1 to 0,5 Hz in 3", {"linspace": ["0.1 Hz", "0.5 Hz", 3]}),
         ("20", {"values": ["20 rpm"]}),

@@ -12,6 +12,7 @@ from sprag_study.service.http.web.form.fields import refine_fields
 from sprag_study.service.jobs.preview import preview_json
 from sprag_study.service.languages import language
 from sprag_study.service.reading.faults import fault_text
+from sprag_study.service.reading.units import parse_quantity
 from sprag_study.service.spec.extend import parse_extended
 from sprag_study.service.spec.kinds.refine import REFINE as RECORD
 from sprag_study.service.spec.longer import longer_spec
@@ -100,9 +101,46 @@ def test_ends_may_be_given_in_any_order_and_unit_and_fields_have_defaults() -> N
     assert plan["start"] == 9
 
 
+def test_an_axis_includes_values_and_the_one_of_the_base() -> None:
+    load = changed({})["base"]["shaft"]["load"]
+    study = parsed(refined({"/axes/1/include": ["300 N*mm", "0.7 N*m", "base"]})).study
+    assert study.plan is not None
+    own = parse_quantity(load, "N*m")
+    assert study.plan["adaptive"] == [
+        {"paths": ["shaft.load"], "low": 0.0, "high": 1.6, "include": sorted([0.3, 0.7, own])}
+    ]
+    assert study.cases == 2 * (5 + len({0.3, 0.7, own} - set(np.linspace(0.0, 1.6, 5).tolist())))
+    assert Study.from_text(study.to_text()) == study
+    frequency = [{"path": "excitation.frequency", "adaptive": ["20 Hz", "30 Hz"], "include": [22]}, AXES[1]]
+    assert parsed(refined({"/axes": frequency, "/refine/start": 9})).study.cases == 90
+
+
 @pytest.mark.parametrize(
     ("changes", "pointer", "code"),
     [
+        ({"/axes/1/include": []}, "/axes/1/include", "wrong-type"),
+        ({"/axes/1/include": [0.1 + 0.01 * k for k in range(17)]}, "/axes/1/include", "wrong-type"),
+        ({"/axes/1/include": 0.3}, "/axes/1/include", "wrong-type"),
+        ({"/axes/1/include": [0.3, "700 N*mm"]}, "/axes/1/include/0", "ambiguous-unit"),
+        ({"/axes/1/include": ["0.3 N*m", "2 N*m"]}, "/axes/1/include/1", "out-of-range"),
+        ({"/axes/1/include": ["0.3 N*m", "300 N*mm"]}, "/axes/1/include/1", "repeated"),
+        ({"/axes/1/include": [0.3, 0.3]}, "/axes/1/include/1", "repeated"),
+        ({"/axes/1/include": ["1e999 N*m"]}, "/axes/1/include/0", "out-of-range"),
+        ({"/axes/1/include": ["many"]}, "/axes/1/include/0", "not-a-number"),
+        ({"/axes/1/include": ["0.3 s"]}, "/axes/1/include/0", "wrong-unit"),
+        ({"/axes/1/include": ["base"], "/base/shaft/load": "2 N*m"}, "/axes/1/include/0", "out-of-range"),
+        (
+            {
+                "/axes/1/include": ["base"],
+                "/axes/1/path": ["excitation.amplitude_x", "excitation.amplitude_y"],
+                "/axes/1/adaptive": ["1 mm", "9 mm"],
+                "/base/excitation/amplitude_y": "3 mm",
+            },
+            "/axes/1/include/0",
+            "conflict",
+        ),
+        ({"/axes/1/include": [0.1, 0.2, 0.3], "/refine/most": 5}, "/refine/most", "out-of-range"),
+        ({"/axes/0/include": ["20 Hz"]}, "/axes/0/include", "unknown-field"),
         ({"/refine/results": ...}, "/refine/results", "required"),
         ({"/refine/results": []}, "/refine/results", "wrong-type"),
         ({"/refine/results": ["shaft.sped.mean"]}, "/refine/results/0", "unknown-name"),
