@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 #: Every revision that a database can have, oldest first. The last one is that of this program.
-REVISIONS: Final = ("0001", *(f"{number:04}" for number in (*range(3, 48), 50, 53, 55, 56)))
+REVISIONS: Final = ("0001", *(f"{number:04}" for number in (*range(3, 48), 50, 53, 55, 56, 57)))
 
 
 def bring_up(connection: sa.Connection, described: sa.MetaData, before: str) -> None:

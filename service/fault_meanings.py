@@ -114,6 +114,10 @@ WARNING_MEANINGS: Final[dict[WarningCode, str]] = {
     "law-jumps": "c_1 > 0: the torque jumps as soon as contact begins.",
     "many-runs": "Cases times starts of each are more than a million runs.",
     "mixed-origins": "The cases of the study were not all computed by one version of Sprag and its libraries.",
+    "near-resonance": (
+        "A harmonic of the cycle is within 5 % of a torsional natural frequency of the train, with the dynamic factor "
+        "that results."
+    ),
     "never-acts": "A step over the stroke begins after its end and never acts.",
     "no-compression": "The discharge pressure is below the suction pressure.",
     "no-discharge": "The compressor does not reach the discharge pressure.",
@@ -139,6 +143,7 @@ WARNING_MEANINGS: Final[dict[WarningCode, str]] = {
     "terms-cancel": "The terms of the fitted law nearly cancel and follow the scatter of the data.",
     "tolerance-cut": "Part of the distribution of a tolerance lies outside the range of its parameter and is left out.",
     "too-few-rows": "The fit has as many unknowns as the data has different windups.",
+    "torque-reverses": "The torque of a coupling changes its sign within the cycle; backlash would matter there.",
     "unstable-motion": "The steady motion of the machine is unstable: its shaft runs away from it, or stops.",
     "wide-limit": "An equality is as wide as its value, so that 0 fulfils it.",
     "wraps-around": "A step over the angle begins after its end and continues past the end of the cycle.",

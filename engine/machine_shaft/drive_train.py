@@ -3,12 +3,14 @@
 A body of inertia J that turns at i times the speed of the main shaft counts as J i^2, a mass m that moves at v per
 rad/s of it as m v^2: the kinetic energy is the same (K. J. Waldron, G. L. Kinzel, *Kinematics, Dynamics, and Design of
 Machinery*). A torque passes a stage of the ratio u and the efficiency eta as u eta M from the motor, and as u M/eta
-where the load drives the motor.
+where the load drives the motor. A coupling is a stage of the ratio 1 and without losses here; how it twists is the
+matter of ``torsion``.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +23,53 @@ Floats = NDArray[np.float64]
 
 #: Numbers of motors that are torques and speeds.
 _TORQUES, _SPEEDS = ("stall_torque", "breakdown_torque", "scale"), ("no_load_speed", "synchronous_speed", "unit_speed")
+
+
+@dataclass(frozen=True, slots=True)
+class Chain:
+    """The bodies between which the couplings of a train lie, reduced to the main shaft, from the motor's on.
+
+    All arrays have the shape (cases or 1, 1, 1).
+
+    Attributes
+    ----------
+    inertias : tuple of arrays
+        Of the drive in each body, in kg*m^2; the last one has the main shaft, without the mechanism.
+    stiffness, damping : tuples of arrays
+        Of each coupling: N*m/rad, reduced to the main shaft, and relative damping.
+    ratios, efficiencies : tuples of arrays
+        Speed of the shaft of each coupling over that of the main shaft, and efficiency of the stages behind it.
+    """
+
+    inertias: tuple[Floats, ...]
+    stiffness: tuple[Floats, ...]
+    damping: tuple[Floats, ...]
+    ratios: tuple[Floats, ...]
+    efficiencies: tuple[Floats, ...]
+
+    @classmethod
+    def of(
+        cls, drive: Drive, values: Mapping[str, Floats], ratios: Sequence[Floats],
+        parts: Sequence[tuple[int, Floats]],
+    ) -> "Chain | None":  # fmt: skip
+        """The chain of a ``drive``, None without couplings; ``parts`` are shafts with reduced inertias on them."""
+        couplings = [index for index, kind in enumerate(drive.stages) if kind == "coupling"]
+        if not couplings:
+            return None
+        inertias = [np.zeros((1, 1, 1)) for _ in range(len(couplings) + 1)]
+        for shaft, inertia in parts:
+            body = sum(index < shaft for index in couplings)
+            inertias[body] = inertias[body] + inertia
+        behind = [np.ones((1, 1, 1))]
+        for index in reversed(range(len(drive.stages))):
+            behind.append(behind[-1] * values.get(f"drive.stages.{index}.efficiency", 1.0))
+        return cls(
+            tuple(inertias),
+            tuple(values[f"drive.stages.{index}.stiffness"] * np.square(ratios[index]) for index in couplings),
+            tuple(values[f"drive.stages.{index}.relative_damping"] for index in couplings),
+            tuple(ratios[index] for index in couplings),
+            tuple(behind[len(drive.stages) - 1 - index] for index in couplings),
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +86,8 @@ class Train:
         Whether there are no stages: the motor's shaft is the main shaft.
     flywheel : Flywheel or None
         The one that is given by its dimensions; its inertia is part of I'.
+    chain : Chain or None
+        What the couplings join; None without couplings.
     """
 
     inertia: Floats
@@ -44,27 +95,31 @@ class Train:
     efficiency: Floats
     direct: bool
     flywheel: Flywheel | None = None
+    chain: Chain | None = None
 
     @classmethod
     def of(cls, drive: Drive, values: Mapping[str, Floats]) -> "Train":
         """The train of ``drive`` with the ``values`` by path."""
-        inertia, efficiency, ratios = values["drive.inertia"], np.ones((1, 1, 1)), _ratios(drive, values)
-        flywheel = None
+        efficiency, ratios, last = np.ones((1, 1, 1)), _ratios(drive, values), len(drive.stages)
+        # What turns with each shaft, reduced to the main shaft.
+        parts, flywheel = [(last, values["drive.inertia"])], None
         if drive.flywheel:
-            shaft = len(drive.stages) if drive.flywheel_shaft is None else drive.flywheel_shaft
+            shaft = last if drive.flywheel_shaft is None else drive.flywheel_shaft
             flywheel = Flywheel.of(drive.flywheel, values, ratios[shaft])
-            inertia = inertia + flywheel.reduced_inertia
-        for index in reversed(range(len(drive.stages))):
+            parts.append((shaft, flywheel.reduced_inertia))
+        for index in reversed(range(last)):
             kind, prefix = drive.stages[index], f"drive.stages.{index}."
             own = {path.removeprefix(prefix): value for path, value in values.items() if path.startswith(prefix)}
             if kind not in MOVING:
-                inertia = inertia + own["output_inertia"] * np.square(ratios[index + 1])
-                efficiency = efficiency * own["efficiency"]
+                parts.append((index + 1, own["output_inertia"] * np.square(ratios[index + 1])))
+                efficiency = efficiency * own.get("efficiency", 1.0)
             way = own["lead"] / (2.0 * math.pi) if kind == "screw_nut" else own.get("radius", 0.0)
-            inertia = inertia + (own["inertia"] + own.get("mass", 0.0) * np.square(way)) * np.square(ratios[index])
+            moved = own["inertia"] + own.get("mass", 0.0) * np.square(way)
+            parts.append((index, moved * np.square(ratios[index])))
         if "drive.motor.inertia" in values:
-            inertia = inertia + values["drive.motor.inertia"] * np.square(ratios[0])
-        return cls(inertia, ratios[0], efficiency, not drive.stages, flywheel)
+            parts.append((0, values["drive.motor.inertia"] * np.square(ratios[0])))
+        inertia = reduce(np.add, (own for _, own in parts))
+        return cls(inertia, ratios[0], efficiency, not drive.stages, flywheel, Chain.of(drive, values, ratios, parts))
 
     def motor(self, values: Mapping[str, Floats]) -> dict[str, Floats]:
         """Numbers of a motor as it acts on the main shaft, with the efficiency of the train."""
@@ -130,6 +185,5 @@ def _ratios(drive: Drive, values: Mapping[str, Floats]) -> list[Floats]:
     """Speed of each shaft over that of the main shaft, from the motor's to the main shaft, (cases or 1, 1, 1) each."""
     ratios = [np.ones((1, 1, 1))]
     for index in reversed(range(len(drive.stages))):
-        moving = drive.stages[index] in MOVING
-        ratios.append(ratios[-1] if moving else ratios[-1] * values[f"drive.stages.{index}.ratio"])
+        ratios.append(ratios[-1] * values.get(f"drive.stages.{index}.ratio", 1.0))
     return ratios[::-1]

@@ -1,11 +1,11 @@
-"""What the working parts and the joints of a machine have to bear, as results of cases that a study asks for.
+"""What the working parts, joints and couplings of a machine have to bear, as results of cases that a study asks for.
 
 (docs/theory-machine-shaft.md, "Loads".)
 """
 
 from sprag_study.engine.catalogue import ResultInfo
 from sprag_study.engine.machine_shaft.joints import joint_names
-from sprag_study.engine.machine_shaft.spec import MAX_PARTS, MachineSpec
+from sprag_study.engine.machine_shaft.spec import MAX_PARTS, MAX_STAGES, MachineSpec
 
 #: Most joints of a machine whose forces are results.
 MAX_JOINTS = 64
@@ -30,6 +30,11 @@ _OF_JOINT = (
     ("direction", "rad", "direction of the largest force in the joint, from the x axis"),
     ("angle_at_max", "rad", "angle of the shaft at which the force in the joint is largest"),
 )
+_OF_COUPLING = (
+    ("torque.max", "N*m", "largest torque in the coupling in magnitude, at its own shaft"),
+    ("torque.amplitude", "N*m", "half the range of the torque in the coupling, at its own shaft"),
+    ("dynamic_factor", "1", "largest torque in the coupling / largest with a rigid train"),
+)
 
 
 def joints_of(model: MachineSpec) -> tuple[str, ...]:
@@ -46,16 +51,28 @@ def joints_of(model: MachineSpec) -> tuple[str, ...]:
     return tuple(names)
 
 
-def load_infos(parts: int, joints: int) -> tuple[ResultInfo, ...]:
-    """Every result of a machine with that many parts and joints, in the order of the columns of ``loads``."""
+def couplings_of(model: MachineSpec) -> int:
+    """Number of the couplings in the train."""
+    return model.drive.stages.count("coupling")
+
+
+def load_infos(parts: int, joints: int, couplings: int = 0) -> tuple[ResultInfo, ...]:
+    """Every result of a machine with that many parts, joints and couplings, in the order of ``loads``."""
     infos = list(_WHOLE)
     for part in range(parts):
         infos += [_R(f"parts.{part}.{name}", unit, text) for name, unit, text in _OF_PART]
     for joint in range(joints):
         infos += [_R(f"joints.{joint}.force.{name}", unit, text) for name, unit, text in _OF_JOINT]
+    for coupling in range(couplings):
+        infos += [_R(f"couplings.{coupling}.{name}", unit, text) for name, unit, text in _OF_COUPLING]
     return tuple(infos)
 
 
+def infos_of(model: MachineSpec) -> tuple[ResultInfo, ...]:
+    """Every result of this machine, in the order of the columns of ``loads``."""
+    return load_infos(len(model.every_part()), len(joints_of(model)), couplings_of(model))
+
+
 def every_load_info() -> tuple[ResultInfo, ...]:
-    """Those of a machine with as many parts and joints as one can have."""
-    return load_infos(MAX_PARTS, MAX_JOINTS)
+    """Those of a machine with as many parts, joints and couplings as one can have."""
+    return load_infos(MAX_PARTS, MAX_JOINTS, MAX_STAGES)

@@ -1,10 +1,10 @@
-"""Loads of a block of cases: motion and force of each working part, forces in the joints.
+"""Loads of a block of cases: motion and force of each working part, forces in the joints, torques in the couplings.
 
 (docs/theory-machine-shaft.md, "Loads".) They are those of the table over the angle; extremes and means are those of the
 continuous functions.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sprag_study.engine import elementary
 from sprag_study.engine.endings import ENDINGS, Ending
 from sprag_study.engine.machine_shaft.decomposition import Decomposition, wrapped
-from sprag_study.engine.machine_shaft.load_results import joints_of, load_infos
+from sprag_study.engine.machine_shaft.load_results import infos_of
 from sprag_study.engine.machine_shaft.machine import Machine
 from sprag_study.engine.machine_shaft.parts import ShaftPart
 
@@ -49,24 +49,26 @@ def operation_factor(machine: Machine, balance_factor: Floats) -> Floats:
     return np.nan_to_num(balance_factor, nan=0.0)
 
 
-def loads(moving: Moving, endings: NDArray[np.int8]) -> Floats:
+def loads(moving: Moving, endings: NDArray[np.int8], known: Mapping[str, Floats]) -> Floats:
     """Loads of every case that ended ok.
 
     Parameters
     ----------
     moving : Moving
     endings : int8 array, shape (cases,)
+    known : mapping
+        Results by name, each (cases,), with those of the couplings (``torsion_results``).
 
     Returns
     -------
     array, shape (cases, results)
-        In the order of ``load_infos`` for the parts and joints of the machine; NaN where a case did not end ok, and
+        In the order of ``infos_of`` the machine; NaN where a case did not end ok, and
         where a value does not exist.
     """
     machine, d = moving.machine, moving.decomposition
     spec, cases = machine.spec, machine.columns.cases
-    infos = load_infos(len(machine.parts), len(joints_of(spec)))
-    values = _of_shaft(machine, d)
+    infos = infos_of(spec)
+    values = {info.name: known[info.name] for info in infos if info.name in known} | _of_shaft(machine, d)
     with np.errstate(all="ignore"):
         shaped = _Shaped(d)
         joints = 0

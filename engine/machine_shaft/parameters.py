@@ -239,10 +239,20 @@ def _stage(index: int, kind: Stage) -> tuple[Parameter, ...]:
     radius = "radius of the driving pulley or sprocket, or of the rack's pinion"
     if kind in MOVING:
         return (_length(f"{p}.radius", "r", radius), *common)
+    output = _inertia(f"{p}.output_inertia", "J_2", "inertia that turns with the stage's output shaft")
+    if kind == "coupling":
+        stiff = "torque over twist, of a coupling or of an elastic shaft"
+        loss = "energy lost in a cycle of vibration over the largest elastic energy"
+        return (
+            Parameter(f"{p}.stiffness", "k", "N*m/rad", 0.0, 1e12, True, None, stiff),
+            Parameter(f"{p}.relative_damping", "psi", "1", 0.0, 100.0, False, 0.0, loss),
+            output,
+            common[0],
+        )
     turning = (
         Parameter(f"{p}.ratio", "u", "1", 0.0, 1e6, True, None, "speed of its input shaft over that of its output"),
         Parameter(f"{p}.efficiency", "eta", "1", 0.0, 1.0, True, 1.0, "power given over power taken"),
-        _inertia(f"{p}.output_inertia", "J_2", "inertia that turns with the stage's output shaft"),
+        output,
     )
     if kind in {"gear", "worm"}:
         return (*turning, common[0])

@@ -1,6 +1,7 @@
 """Checks of numbers that are individually in range but contradict each other; done before a base machine is solved."""
 
 from sprag_study.engine.machine_shaft.columns import Columns
+from sprag_study.engine.machine_shaft.drive_train import Train
 from sprag_study.engine.machine_shaft.operations import reachable_pressure
 from sprag_study.engine.machine_shaft.problems import RelationError, alone, amount
 from sprag_study.engine.machine_shaft.spec import MachineSpec
@@ -13,10 +14,12 @@ def check_relations(spec: MachineSpec, row: Columns) -> None:
     Raises
     ------
     RelationError
-        A belt with a mass but without a radius; a rim that is thicker than its mean diameter; discharge below suction,
-        or above what the clearance lets the compressor reach; a step over the stroke that ends before it begins.
+        A belt with a mass but without a radius; a coupling with nothing that turns on one side of it; a rim that is
+        thicker than its mean diameter; discharge below suction, or above what the clearance lets the compressor reach;
+        a step over the stroke that ends before it begins.
     """
     _check_stages(spec, row)
+    _check_couplings(spec, row)
     if spec.drive.flywheel == "ring":
         _check_ring(row)
     for prefix, part in spec.every_part():
@@ -36,6 +39,27 @@ def _check_stages(spec: MachineSpec, row: Columns) -> None:
                 else Sentence("is needed for the speed of the chain, which has a mass")
             )
             raise RelationError(path, 0.0, message, alone(">", amount(0.0, "m")))
+
+
+def _check_couplings(spec: MachineSpec, row: Columns) -> None:
+    """Refuse a coupling before which nothing turns, as far as the last coupling before it, or nothing after the last.
+
+    The mechanism turns with the main shaft, so that behind the last coupling its inertia is enough.
+    """
+    chain = Train.of(spec.drive, row.values).chain
+    if chain is None:
+        return
+    stages = [index for index, kind in enumerate(spec.drive.stages) if kind == "coupling"]
+    bare = all(part.mechanism.kind == "none" for _, part in spec.every_part())
+    for body, inertia in enumerate(chain.inertias):
+        last = body == len(stages)
+        if inertia[0, 0, 0] > 0.0 or (last and not bare):
+            continue
+        raise RelationError(
+            f"drive.stages.{stages[body - 1]}.output_inertia" if body else f"drive.stages.{stages[0]}.inertia", 0.0,
+            Sentence("is needed: nothing else turns between this coupling and the next one, or the end of the train"),
+            alone(">", amount(0.0, "kg*m^2")),
+        )  # fmt: skip
 
 
 def _check_ring(row: Columns) -> None:

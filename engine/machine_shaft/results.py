@@ -92,6 +92,17 @@ MACHINE_RESULTS: tuple[ResultInfo, ...] = (
     _R("motor.torque.rms", "N*m", "root mean square of the motor's torque over time, by which it warms", generation=1),
     _R("motor.power.rms", "W", "root mean square of the motor's power over time", generation=1),
     _R("motor.torque.margin", "1", "thermal margin: rated torque of the motor / rms of its torque", generation=1),
+    _R("torsion.natural_frequency", "rad/s", "lowest torsional natural frequency of the train", generation=2),
+    _R("torsion.order", "1", "harmonic of the cycle that is nearest to a natural frequency of the train, of those that "
+       "excite it", "count", generation=2),
+    _R("torsion.margin", "1", "distance of that harmonic from the natural frequency / natural frequency", generation=2),
+    _R("torsion.dynamic_factor", "1", "largest torque in a coupling / largest with a rigid train: the largest of all "
+       "couplings", generation=2),
+    _R("torsion.coupling", "1", "number of the coupling with the largest dynamic factor, counted from 1 at the motor",
+       "count", generation=2),
+    _R("torsion.torque.amplitude", "N*m", "half the range of the torque in a coupling: the largest of all couplings",
+       generation=2),
+    _R("torsion.reversals", "1", "number of couplings whose torque changes its sign", "count", generation=2),
 )  # fmt: skip
 
 

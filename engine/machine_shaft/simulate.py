@@ -15,7 +15,7 @@ from sprag_study.engine.machine_shaft.decomposition import Decomposition, charac
 from sprag_study.engine.machine_shaft.drive_train import Train
 from sprag_study.engine.machine_shaft.flywheel import flywheel_results, required_inertia
 from sprag_study.engine.machine_shaft.kinks import motion_kinks
-from sprag_study.engine.machine_shaft.load_results import joints_of, load_infos
+from sprag_study.engine.machine_shaft.load_results import infos_of
 from sprag_study.engine.machine_shaft.loads import Moving, loads, operation_factor
 from sprag_study.engine.machine_shaft.machine import Fields, Machine, check_structure
 from sprag_study.engine.machine_shaft.motor import characteristic, limit_cycle
@@ -26,6 +26,7 @@ from sprag_study.engine.machine_shaft.spec import MachineSpec
 from sprag_study.engine.machine_shaft.speed_course import follows_speed, speed_course
 from sprag_study.engine.machine_shaft.stability import Stability
 from sprag_study.engine.machine_shaft.start import Shape, Stop, least_mean_speed, start_energy
+from sprag_study.engine.machine_shaft.torsion import torsion_results
 from sprag_study.engine.outcome import Batch
 
 Floats = NDArray[np.float64]
@@ -337,6 +338,18 @@ def _required(spec: MachineSpec, columns: Columns, d: Decomposition, endings: Co
     return required
 
 
+def _with_last(
+    attempted: Iterator[tuple[NDArray[np.int64], Solved]],
+) -> Iterator[tuple[NDArray[np.int64], Solved, Bools]]:
+    """Each attempt with the cases whose last it is."""
+    before = next(attempted, None)
+    while before is not None:
+        following = next(attempted, None)
+        rows, solved = before
+        yield rows, solved, ~np.isin(rows, () if following is None else following[0])
+        before = following
+
+
 def _block(spec: MachineSpec, columns: Columns, further: Floats | None) -> tuple[Floats, Codes]:
     """Results and endings of a block of cases: finer panels for those that need them; writes ``further`` loads."""
     values = np.full((columns.cases, len(_NAMES)), np.nan)
@@ -344,9 +357,13 @@ def _block(spec: MachineSpec, columns: Columns, further: Floats | None) -> tuple
     angle = Machine(spec, columns).unassembled()
     values[:, _NAMES.index("assembly.angle")] = angle
     assembled = np.nonzero(np.isnan(angle))[0]
-    for found, solved in attempts(spec, columns.take(assembled)):
+    for found, solved, last in _with_last(attempts(spec, columns.take(assembled))):
         rows = assembled[found]
-        lost = settle(spec, columns.take(rows), solved)
+        own = columns.take(rows)
+        lost = settle(spec, own, solved)
+        vibrating = last & (solved.endings == _CODE[Ending.OK])
+        chain = Train.of(spec.drive, own.values).chain
+        solved.results.update(torsion_results(chain, solved.decomposition, solved.results, vibrating))
         for position, name in enumerate(_NAMES):
             if name != "assembly.angle":
                 values[rows, position] = solved.results[name]
@@ -354,9 +371,11 @@ def _block(spec: MachineSpec, columns: Columns, further: Floats | None) -> tuple
         endings[rows] = solved.endings
         values[rows[lost]] = np.nan
         if further is not None:
-            machine = Machine(spec, columns.take(rows))
+            machine = Machine(spec, own)
             factor = operation_factor(machine, solved.results["balance.factor"])
-            further[rows] = loads(Moving(machine, solved.decomposition, solved.omega, factor), solved.endings)
+            further[rows] = loads(
+                Moving(machine, solved.decomposition, solved.omega, factor), solved.endings, solved.results
+            )
     values[~np.isfinite(values)] = np.nan
     return values, endings
 
@@ -376,7 +395,7 @@ def simulate(model: MachineSpec, columns: Mapping[str, ArrayLike], *, cases: int
     cases : int
         Number of cases, at least 0.
     with_loads : bool
-        Whether the results of ``load_infos`` follow those of ``result_infos``.
+        Whether the results of ``infos_of`` follow those of ``result_infos``.
 
     Returns
     -------
@@ -393,7 +412,7 @@ def simulate(model: MachineSpec, columns: Mapping[str, ArrayLike], *, cases: int
     block = Columns.of(model, columns, cases)
     values = np.empty((cases, len(_NAMES)))
     endings = np.empty(cases, dtype=np.int8)
-    count = len(load_infos(len(model.every_part()), len(joints_of(model)))) if with_loads else 0
+    count = len(infos_of(model)) if with_loads else 0
     further = np.full((cases, count), np.nan)
     size = BLOCK * _BLOCK_CYCLE // max(model.cycle, _BLOCK_CYCLE)
     for first in range(0, cases, size):

@@ -13,7 +13,7 @@ Balance = Literal["scale", "constant", "refuse", "motor"]
 BalanceSide = Literal["drive", "operation"]
 Motor = Literal["linear", "kloss", "table"]
 Flywheel = Literal["rim", "disc", "ring"]
-Stage = Literal["gear", "belt", "chain", "worm", "screw_nut", "rack"]
+Stage = Literal["gear", "belt", "chain", "worm", "screw_nut", "rack", "coupling"]
 MechanismKind = Literal[
     "none", "table", "formula", "slider_crank", "scotch_yoke", "four_bar", "parallel_crank",
     "quick_return", "drag_link", "toggle", "cam", "linkage",

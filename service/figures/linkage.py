@@ -38,7 +38,7 @@ _WHEEL_APART: Final = 56.0
 _ABOVE: Final = (0.0, -9.0)
 _STAGES: Final = {
     "gear": N_("gear"), "worm": N_("worm gear"), "belt": N_("belt"), "chain": N_("chain"), "screw_nut": N_("screw"),
-    "rack": N_("rack"),
+    "rack": N_("rack"), "coupling": N_("coupling"),
 }  # fmt: skip
 
 
@@ -234,7 +234,8 @@ def _train(structure: Mapping[str, Any], base: Mapping[str, float]) -> Iterator[
             x += _WHEEL_APART
         wheels = _wheels(kind, x + _APART / 2, base.get(f"drive.stages.{index}.ratio", 1.0))
         shapes += [_line(x, x + _APART), *_stage(kind, x + _APART / 2, wheels)]
-        name = next((own for own in ("ratio", "lead", "radius") if f"drive.stages.{index}.{own}" in base), "inertia")
+        named = ("ratio", "lead", "radius", "stiffness")
+        name = next((own for own in named if f"drive.stages.{index}.{own}" in base), "inertia")
         place, radius = max(wheels, key=lambda wheel: wheel[1])
         dimensions.append(Dimension(f"drive.stages.{index}.{name}", "", place, _LEVEL - radius, "right", _ABOVE))
         x += _APART
@@ -273,6 +274,8 @@ def _box(x: float, title: str) -> str:
 
 def _wheels(kind: str, x: float, ratio: float) -> tuple[tuple[float, float], tuple[float, float]]:
     """Places along the shaft and radii of the two wheels of a stage (px)."""
+    if kind == "coupling":
+        return (x - 5.0, 20.0), (x + 5.0, 20.0)
     share = ratio if math.isfinite(ratio) and ratio > 0.0 else 1.0
     small, large = (_LARGE / share, _LARGE) if share >= 1.0 else (_LARGE, _LARGE * share)
     small, large = (max(own, 6.0) for own in (small, large))
@@ -281,10 +284,13 @@ def _wheels(kind: str, x: float, ratio: float) -> tuple[tuple[float, float], tup
 
 
 def _stage(kind: str, x: float, wheels: tuple[tuple[float, float], tuple[float, float]]) -> Iterator[str]:
-    """Two wheels of a stage; belts and chains go round both."""
+    """Two wheels of a stage; belts and chains go round both. A coupling is two discs from the side."""
     (left, small), (right, large) = wheels
-    yield f'<circle class="wheel" cx="{left:g}" cy="{_LEVEL:g}" r="{small:g}"/>'
-    yield f'<circle class="wheel" cx="{right:g}" cy="{_LEVEL:g}" r="{large:g}"/>'
+    for place, radius in wheels:
+        if kind == "coupling":
+            yield f'<rect class="mass" x="{place - 3:g}" y="{_LEVEL - radius:g}" width="6" height="{2 * radius:g}"/>'
+        else:
+            yield f'<circle class="wheel" cx="{place:g}" cy="{_LEVEL:g}" r="{radius:g}"/>'
     if kind in {"belt", "chain"}:
         ends = (
             f"{left:g} {_LEVEL - small:g}L{right:g} {_LEVEL - large:g}",

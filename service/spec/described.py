@@ -326,8 +326,8 @@ _LOADS: Final = (
     "ratings, too; each case takes longer"
 )
 _LOADS_OF_SHAFTS: Final = (
-    "whether the results have stroke, speed, acceleration and force of the working parts and the forces in the joints, "
-    "too; each case takes longer"
+    "whether the results have stroke, speed, acceleration and force of the working parts, the forces in the joints "
+    "and the torques in the couplings, too; each case takes longer"
 )
 _BACKLASH: Final = "whether the angles include the backlash, which is then subtracted"
 

@@ -37,6 +37,14 @@ _UNSTABLE = {
     "mean_speed": "12 rad/s", "drive": {"inertia": "2 kg*m^2"},
     "operation": {"quantity": "torque", "formula": "100/omega*(1 + 0.5*sin(phi))"},
 }  # fmt: skip
+_COUPLED = {
+    "mean_speed": "10 rad/s", "drive": {
+        "inertia": "20 kg*m^2", "stages": [{
+            "kind": "coupling", "stiffness": "870 N*m/rad", "relative_damping": 0.1, "inertia": "1 kg*m^2",
+        }],
+    },
+    "operation": {"quantity": "torque", "formula": "4 + 25*cos(3*phi)"},
+}  # fmt: skip
 _WHEEL = {"/base/drive/flywheel": {"kind": "rim", "diameter": "1 m", "mass": "50 kg", "poisson_ratio": 0.3}}
 
 
@@ -113,7 +121,7 @@ def of_shafts() -> Iterator[str]:
     base = whole["base"]
     base["parts"] = [{name: base.pop(name) for name in ("mechanism", "operation")}, {"crank_angle": "90 deg"}]
     yield from parse_spec(whole).warnings
-    for base in (_UNSTABLE, _SADDLE):
+    for base in (_UNSTABLE, _SADDLE, _COUPLED):
         yield from parse_spec({"sprag": 1, "model": "machine-shaft", "base": base, "axes": []}).warnings
 
 

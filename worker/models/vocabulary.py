@@ -18,7 +18,10 @@ _CONSTANT: Final = "constants.NAME"
 #: Caption of the half width of a mean.
 HALF_WIDTH: Final = "{caption}, half width"
 #: What a numbered part is called, by the first words of its paths.
-_PARTS: Final = (("pendulums", "pendulum"), ("parts", "part"), ("drive.stages", "stage"), ("joints", "joint"))
+_PARTS: Final = (
+    ("pendulums", "pendulum"), ("parts", "part"), ("drive.stages", "stage"), ("joints", "joint"),
+    ("couplings", "coupling"),
+)  # fmt: skip
 #: What of the drives a goal can be about (`sprag_study.worker.planning.goals.plan`).
 OF_DRIVES: Final = ("mean of the drives", "deviation of the drives", "{number} % quantile")
 #: What designs of a search have beside their goals and limits.

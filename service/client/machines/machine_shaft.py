@@ -57,9 +57,11 @@ class ShaftDriveStage(TypedDict, total=False):
     radius : Radius of the driving pulley or sprocket, or of the rack's pinion; required for a rack (r), m; >= 0 m and
         <= 1000 m.
     lead : Way of the nut in a revolution of the screw (p), m; > 0 m and <= 1000 m.
+    stiffness : Torque over twist, of a coupling or of an elastic shaft (k), N*m/rad; > 0 N*m/rad and <= 1e+12 N*m/rad.
+    relative_damping : Energy lost in a cycle of vibration over the largest elastic energy (psi); >= 0 and <= 100.
     """
 
-    kind: Literal["gear", "belt", "chain", "worm", "screw_nut", "rack"]
+    kind: Literal["gear", "belt", "chain", "worm", "screw_nut", "rack", "coupling"]
     ratio: Quantity
     efficiency: Quantity
     output_inertia: Quantity
@@ -67,6 +69,8 @@ class ShaftDriveStage(TypedDict, total=False):
     mass: Quantity
     radius: Quantity
     lead: Quantity
+    stiffness: Quantity
+    relative_damping: Quantity
 
 
 class ShaftDriveFlywheel(TypedDict, total=False):
@@ -105,7 +109,7 @@ class ShaftDrive(TypedDict, total=False):
     motor : A motor whose torque depends on its speed; fields kind, no_load_speed, stall_torque, inertia, rated_torque,
         synchronous_speed, breakdown_torque, breakdown_slip, scale, table, csv, interpolation; needed: kind.
     stages : Stages between motor and main shaft, motor first; fields kind, ratio, efficiency, output_inertia, inertia,
-        mass, radius, lead; needed: kind.
+        mass, radius, lead, stiffness, relative_damping; needed: kind.
     flywheel : A flywheel given by its dimensions, on a shaft of the train; fields kind, shaft, diameter, mass, density,
         poisson_ratio, allowed_stress, width, thickness; needed: kind, diameter.
     """
@@ -534,8 +538,8 @@ class ShaftPart(TypedDict, total=False):
 class ShaftRun(TypedDict, total=False):
     """Which results the cases have; a machine shaft is solved for its whole cycle at once.
 
-    loads : Whether the results have stroke, speed, acceleration and force of the working parts and the forces in the
-        joints, too; each case takes longer.
+    loads : Whether the results have stroke, speed, acceleration and force of the working parts, the forces in the
+        joints and the torques in the couplings, too; each case takes longer.
     """
 
     loads: bool
@@ -565,6 +569,8 @@ class Shaft(Studies):
         "drive.stages.*.mass",
         "drive.stages.*.radius",
         "drive.stages.*.lead",
+        "drive.stages.*.stiffness",
+        "drive.stages.*.relative_damping",
         "drive.flywheel.diameter",
         "drive.flywheel.mass",
         "drive.flywheel.density",

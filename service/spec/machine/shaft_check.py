@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cache, partial
 from typing import Any, Final, cast
 
-from sprag_study.sentences import Amount, Sentence
+from sprag_study.sentences import Amount, Sentence, plural
 from sprag_study.service.faults import Code
 from sprag_study.service.spec.fields import base_pointer
 from sprag_study.service.spec.report import Report
@@ -36,6 +36,8 @@ _UNSTABLE: Final = Sentence(
     "the steady motion of this machine is unstable: deviations of the speed grow in every cycle, so a case of it ends "
     "as `unstable_motion`, with the multiplier of the cycle"
 )
+#: Distance of a harmonic from a natural frequency, as a share of that, below which it is warned of.
+_NEAR_RESONANCE: Final = 0.05
 _NEUTRAL: Final[dict[str, dict[str, Any]]] = {"drive": {}, "mechanism": {"kind": "none"}, "operation": {}}
 
 
@@ -103,6 +105,8 @@ def check_machine(
                 speed=Amount(other, "rad/s", 4),
             )
             report.warn("several-speeds", "/base", message)
+        if "coupling" in structure["drive"].get("stages", ()):
+            _warn_of_torsion(report, machine_shaft.base_results(structure, values), structure["cycle"])
     except ExpressionError as error:
         formula = _at(structure, error.part).get("formula") if error.part in places else None
         report.fault(places.get(error.part, "/base"), "invalid-formula", error.message, formula)
@@ -115,6 +119,31 @@ def check_machine(
     except MachineError as error:
         where = _pointer(error, structure, places)
         report.fault(where, code_of(error), error.message, error.found, allowed=error.allowed)
+
+
+def _warn_of_torsion(report: Report, results: Mapping[str, float], turns: int) -> None:
+    """Warn of a harmonic of the cycle near a natural frequency of the train, and of torques that change their sign."""
+    order, margin, factor = (results[f"torsion.{name}"] for name in ("order", "margin", "dynamic_factor"))
+    if margin < _NEAR_RESONANCE:
+        near = Sentence(
+            "harmonic {order} of the cycle, {speed}, is within {margin} of a torsional natural frequency of the train; "
+            "the largest dynamic factor of its couplings is {factor}",
+            order=str(round(order)),
+            speed=Amount(order * results["omega.mean_time"] / turns, "rad/s", 4),
+            margin=Amount(100.0 * margin, "%", 2),
+            factor=Amount(factor, digits=4),
+        )
+        report.warn("near-resonance", "/base/drive/stages", near)
+    if results["torsion.reversals"] > 0:
+        count = round(results["torsion.reversals"])
+        turned = plural(
+            "the torque of {count} coupling changes its sign within the cycle; with backlash in the train it would "
+            "lift off and strike there, which the linear train leaves out",
+            "the torque of {count} couplings changes its sign within the cycle; with backlash in the train they would "
+            "lift off and strike there, which the linear train leaves out",
+            count,
+        )
+        report.warn("torque-reverses", "/base/drive/stages", turned)
 
 
 def _alone(structure: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Any], Any]]:

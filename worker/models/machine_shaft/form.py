@@ -27,6 +27,7 @@ _GEARED: Final = ("ratio", "efficiency", "output_inertia", "inertia")
 _STAGES: Final = {
     **dict.fromkeys(("gear", "worm"), _GEARED), **dict.fromkeys(("belt", "chain"), (*_GEARED, "mass", "radius")),
     "screw_nut": ("lead", "inertia", "mass"), "rack": ("radius", "inertia", "mass"),
+    "coupling": ("stiffness", "relative_damping", "inertia", "output_inertia"),
 }  # fmt: skip
 #: Mechanisms and their choices.
 _BODIES: Final = ("weights", "bodies")
@@ -228,7 +229,8 @@ FORM: Final = Form(
     front=(
         "mean_speed", "wanted_irregularity", "drive", r"drive\.(inertia|torque(\.\w+)?|flywheel)",
         r"drive\.motor\.(?!inertia|rated).*", r"drive\.flywheel\.(mass|diameter|width|thickness|shaft)",
-        r"drive\.stages\.N\.(kind|ratio|lead|radius)", r"(parts\.N\.)?(mechanism|operation|crank_angle)",
+        r"drive\.stages\.N\.(kind|ratio|lead|radius|stiffness|relative_damping)",
+        r"(parts\.N\.)?(mechanism|operation|crank_angle)",
         r"(parts\.N\.)?mechanism\.\w+\.(?!(kind|bodies|weights|rise|fall|inclination|.*_(centre|inertia|angle))$).*",
         r"(parts\.N\.)?mechanism\.(formula|csv|cam\.\w+_angle|linkage\.(elements|working))",
         r"(parts\.N\.)?operation\.(quantity|over|value|steps|formula|csv|scale|gas\.\w+_(area|pressure)|indicator\.csv)",

@@ -15,7 +15,7 @@ import numpy as np
 
 from sprag_study.engine import Ending
 from sprag_study.engine.machine_shaft.elements import ELEMENT_KINDS, Element, LinkageChoice
-from sprag_study.engine.machine_shaft.load_results import every_load_info, joints_of, load_infos
+from sprag_study.engine.machine_shaft.load_results import couplings_of, every_load_info, infos_of, joints_of, load_infos
 from sprag_study.engine.machine_shaft.parameters import parameters as _engine_parameters
 from sprag_study.engine.machine_shaft.results import result_infos
 from sprag_study.engine.machine_shaft.spec import (
@@ -189,18 +189,14 @@ def joints_in(structure: Mapping[str, Any] | None) -> tuple[str, ...]:
     return joints_of(spec_of(structure))
 
 
-#: Variant of the studies with loads of machines with the most parts and joints; that of others begins with it.
+#: Variant of the studies with loads of machines with the most parts, joints and couplings; others begin with it.
 _LOADS_VARIANT: Final = "loads"
 
 
-def _variant(parts: int, joints: int) -> str:
-    return f"{_LOADS_VARIANT}-{parts}-{joints}"
-
-
-def _loaded(study: Study) -> tuple[int, int]:
-    """Numbers of the parts and joints of a machine."""
-    spec = spec_of(study.structure)
-    return len(spec.every_part()), len(joints_of(spec))
+def _variant(spec: MachineSpec) -> str:
+    """With the numbers of parts and joints, and of couplings where there are any."""
+    counts = [len(spec.every_part()), len(joints_of(spec)), couplings_of(spec)]
+    return "-".join([_LOADS_VARIANT, *map(str, counts if counts[2] else counts[:2])])
 
 
 @cache
@@ -209,14 +205,13 @@ def _results(variant: str) -> tuple[ResultInfo, ...]:
         return result_infos()
     if variant == _LOADS_VARIANT:
         return (*result_infos(), *every_load_info())
-    _, parts, joints = variant.split("-")
-    return (*result_infos(), *load_infos(int(parts), int(joints)))
+    return (*result_infos(), *load_infos(*map(int, variant.split("-")[1:])))
 
 
 class MachineShaft(Model):
     """A shaft that a drive turns steadily against a mechanism and its resistance, over one cycle.
 
-    Studies with loads have a variant for each number of parts and joints; all of them share one table.
+    Studies with loads have a variant for each number of parts, joints and couplings; all of them share one table.
     """
 
     name = MODEL
@@ -247,7 +242,7 @@ class MachineShaft(Model):
     presentation = PRESENTATION
 
     def presentation_of(self, study: Study) -> Presentation:
-        """With the results of its flywheel and motor among the main ones."""
+        """With the results of its flywheel, motor and couplings among the main ones."""
         return presentation_of(study.structure or {}, {*study.base, *study.column_paths})
 
     def parameters(self) -> tuple[Parameter, ...]:
@@ -260,7 +255,7 @@ class MachineShaft(Model):
         return ("", _LOADS_VARIANT)
 
     def variant_of(self, study: Study) -> str:
-        return _variant(*_loaded(study)) if has_loads(study.run) else ""
+        return _variant(spec_of(study.structure)) if has_loads(study.run) else ""
 
     def table_of(self, variant: str) -> str:
         return _LOADS_VARIANT if variant else ""
@@ -269,14 +264,16 @@ class MachineShaft(Model):
         return _results(variant)
 
     def further_results(self, study: Study) -> tuple[ResultInfo, ...]:
-        return () if has_loads(study.run) else load_infos(*_loaded(study))
+        return () if has_loads(study.run) else infos_of(spec_of(study.structure))
 
     def joints(self, study: Study) -> tuple[str, ...]:
         return joints_in(study.structure) if has_loads(study.run) else ()
 
     def result_catalogue(self) -> tuple[ResultInfo, ...]:
-        infos = load_infos(1, 1)
-        named = ((info, info.name.replace("parts.0.", "parts.N.").replace("joints.0.", "joints.K.")) for info in infos)
+        named = (
+            (info, re.sub(r"^(joints|couplings)\.0\.", r"\1.K.", info.name.replace("parts.0.", "parts.N.")))
+            for info in load_infos(1, 1, 1)
+        )
         return (*result_infos(), *(replace(info, name=name) for info, name in named))
 
     def shape_of(self, study: Study) -> KernelShape:
@@ -371,11 +368,11 @@ def _run_each_kind() -> bytes:
     for mean, balance in product(("midrange", "angle", "time"), ("scale", "motor")):
         spec = MachineSpec(
             mean_speed_is=cast("Any", mean), balance=cast("Any", balance),
-            drive=Drive("formula", formula="2 + cos(phi)", motor="linear"),
+            drive=Drive("formula", formula="2 + cos(phi)", motor="linear", stages=("coupling",)),
             mechanism=MechanismChoice("formula", formula="1 + 0.1*sin(phi)^2"),
             operation=OperationChoice("torque", "formula", formula="1 + sin(phi)"),
         )  # fmt: skip
-        numbers = {"drive.inertia": 1.0}
+        numbers = {"drive.inertia": 1.0, "drive.stages.0.inertia": 0.1, "drive.stages.0.stiffness": 100.0}
         if balance == "motor":
             numbers |= {"drive.motor.no_load_speed": 10.0, "drive.motor.stall_torque": 20.0}
         else:

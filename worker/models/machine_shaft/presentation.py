@@ -71,6 +71,7 @@ _THEORY: Final = {
     "balance_side": "balance-of-works",
     "drive": "balance-of-works",
     **dict.fromkeys(("drive.inertia", "drive.stages"), "the-drive-train"),
+    **dict.fromkeys(("drive.stages.stiffness", "drive.stages.relative_damping"), "torsional-vibration"),
     "drive.torque": "balance-of-works",
     "drive.scale": "balance-of-works",
     "drive.motor": "balance-of-works",
@@ -128,9 +129,14 @@ _OF_MOTOR: Final = (
     "motor.speed.mean", "motor.torque.mean", "motor.torque.max", "motor.torque.rms", "motor.power.mean"
 )  # fmt: skip
 
+_OF_COUPLINGS: Final = (
+    "torsion.natural_frequency", "torsion.margin", "torsion.dynamic_factor", "torsion.torque.amplitude",
+    "torsion.reversals",
+)  # fmt: skip
+
 
 def presentation_of(structure: Mapping[str, Any], paths: Collection[str] = ()) -> Presentation:
-    """The presentation of machine shafts, with the main results of this one's flywheel and motor.
+    """The presentation of machine shafts, with the main results of this one's flywheel, motor and couplings.
 
     ``paths`` are those of its numbers.
     """
@@ -138,6 +144,8 @@ def presentation_of(structure: Mapping[str, Any], paths: Collection[str] = ()) -
     more: tuple[str, ...] = _OF_FLYWHEEL if drive.get("flywheel") else ()
     if drive.get("motor") or drive.get("stages"):
         more += _OF_MOTOR
+    if "coupling" in drive.get("stages", ()):
+        more += _OF_COUPLINGS
     if "drive.motor.rated_torque" in paths:
         more += ("motor.torque.margin",)
     return replace(PRESENTATION, main=PRESENTATION.main + more) if more else PRESENTATION

@@ -61,6 +61,7 @@ DRIVE: dict[WarningCode, str] = {
     "wide-limit": "/goal/subject_to/0/within (shaft.speed.mean): is at least as wide as the value",
 }
 SHAFT: dict[WarningCode, str] = {
+    "near-resonance": "/base/drive/stages: harmonic 3 of the cycle, 30 rad/s, is within 2 % of a torsional natural",
     "never-acts": "/axes/0 (operation.steps.0.from): where `from` exceeds `to` the step over the stroke never acts",
     "no-compression": "/base/operation/gas/discharge_pressure: is below the suction pressure: nothing is compressed",
     "no-discharge": "/axes/0 (operation.gas.discharge_pressure): the compressor reaches 300000 Pa at most",
@@ -69,6 +70,7 @@ SHAFT: dict[WarningCode, str] = {
     "replaced-value": '/base/parts/0/operation: is not used: the balance "constant" replaces it',
     "several-speeds": "/base: the torques of this machine balance at about 19.01 rad/s too",
     "table-ends-early": "/base/drive/torque: the table ends at 180 deg, 180 deg before its cycle of 360 deg",
+    "torque-reverses": "/base/drive/stages: the torque of 1 coupling changes its sign within the cycle",
     "unstable-motion": "/base: the steady motion of the machine is unstable",
     "wraps-around": "/axes/0 (operation.steps.0.to): where `from` exceeds `to` the step continues",
     "no-effect": "/base/operation/sense: is not used: a positive torque always resists; `sense` is for forces",

@@ -213,3 +213,49 @@ def test_a_rated_torque_belongs_to_a_motor() -> None:
     assert problems({"/base/drive/rated_torque": 5})["/base/drive/rated_torque"].code == "unknown-field"
     with pytest.raises(SpecError, match="/base/drive/motor/rated_torque: is out of range"):
         parse_spec(motor_spec(KLOSS | {"rated_torque": 0}))
+
+
+COUPLED: dict[str, Any] = {
+    "mean_speed": "10 rad/s", "operation": {"quantity": "torque", "formula": "40 + 25*cos(3*phi)"},
+    "drive": {"inertia": "20 kg*m^2", "stages": [
+        {"kind": "coupling", "stiffness": "3 kN*m/rad", "relative_damping": 0.5, "inertia": "1 kg*m^2"},
+    ]},
+}  # fmt: skip
+
+
+def coupled(stage: dict[str, Any], **fields: Any) -> dict[str, Any]:
+    """A machine behind a coupling with other numbers."""
+    (coupling,) = COUPLED["drive"]["stages"]
+    drive = COUPLED["drive"] | {"stages": [coupling | stage]}
+    return {"sprag": 1, "model": "machine-shaft", "name": "mixer", "base": COUPLED | {"drive": drive}, **fields}
+
+
+def test_couplings_have_results_and_warnings() -> None:
+    axis = {"path": "drive.stages.0.stiffness", "values": ["2 kN*m/rad", "3 kN*m/rad"]}
+    parsed = parse_spec(coupled({}, axes=[axis]))
+    assert parsed.warnings == ()
+    names = [info.name for info in models.study_results(parsed.study)]
+    frequencies = models.run_chunk(parsed.study, 0, 2).values[:, names.index("torsion.natural_frequency")]
+    assert frequencies == pytest.approx([math.sqrt(stiff * (1.0 + 1.0 / 20.0)) for stiff in (2e3, 3e3)])
+    assert "torsion.dynamic_factor" in models.presentation_of(parsed.study).main
+    loaded = parse_spec(coupled({}, run={"loads": True})).study
+    names = [info.name for info in models.study_results(loaded)]
+    row = dict(zip(names, models.run_chunk(loaded, 0, 1).values[0].tolist(), strict=True))
+    assert row["couplings.0.torque.amplitude"] == row["torsion.torque.amplitude"]
+    resonant = parse_spec(coupled({"stiffness": "860 N*m/rad", "relative_damping": 0.1})).warnings
+    assert [warning.code for warning in resonant] == ["near-resonance", "torque-reverses"]
+    assert "harmonic 3 of the cycle, 30 rad/s, is within 0.17 % of a torsional natural frequency" in resonant[0]
+
+
+@pytest.mark.parametrize(
+    ("stage", "place", "said"),
+    [
+        ({"stiffness": 0}, "stiffness", "is out of range"),
+        ({"relative_damping": -0.1}, "relative_damping", "is out of range"),
+        ({"inertia": 0}, "inertia", "nothing else turns between this coupling and the next one"),
+        ({"ratio": 2}, "ratio", "is not a field of a stage of the kind coupling"),
+    ],
+)
+def test_a_coupling_that_is_none_is_refused(stage: dict[str, Any], place: str, said: str) -> None:
+    with pytest.raises(SpecError, match=f"/base/drive/stages/0/{place}: .*{said}"):
+        parse_spec(coupled(stage))
