@@ -19,6 +19,8 @@ _GROUP = 7.0
 _SPEED = 12.0
 #: Time with loads over that without.
 _LOADS = 1.4
+#: Additional seconds of a case with couplings. Measured: 1e-3 with a smooth load, 6e-3 with a sudden one.
+_COUPLED = 4e-3
 _SHARP = frozenset({"exp", "tanh", "sinh", "cosh", "atan"})
 
 
@@ -36,7 +38,7 @@ def estimate_seconds(model: MachineSpec, *, with_loads: bool = False) -> float:
     factor += _GROUP * sum(each.kind not in {"pivot", "point"} for each in elements)
     if with_loads:
         factor *= _LOADS
-    return 1e-5 + factor * 7e-6 * panels
+    return 1e-5 + factor * 7e-6 * panels + (_COUPLED if "coupling" in model.drive.stages else 0.0)
 
 
 def _formula_cost(text: str, constants: tuple[str, ...]) -> float:

@@ -32,7 +32,9 @@ def random_train(seed: int) -> tuple[tuple[Stage, ...], dict[str, float]]:
         if kind in {"gear", "belt", "chain", "worm"}:
             own |= {"ratio": rng.uniform(0.3, 6.0), "efficiency": rng.uniform(0.6, 1.0)}
             own |= {"output_inertia": rng.uniform(0.0, 0.2)}
-        if kind not in {"gear", "worm"}:
+        if kind == "coupling":
+            own |= {"stiffness": rng.uniform(10.0, 1e4), "output_inertia": rng.uniform(0.0, 0.2)}
+        elif kind not in {"gear", "worm"}:
             own |= {"mass": rng.uniform(0.0, 5.0)}
             own |= {"lead": rng.uniform(0.001, 0.02)} if kind == "screw_nut" else {"radius": rng.uniform(0.02, 0.3)}
         numbers |= {f"drive.stages.{index}.{name}": float(value) for name, value in own.items()}
@@ -47,8 +49,8 @@ def walked(stages: tuple[Stage, ...], numbers: dict[str, float]) -> tuple[float,
         way = numbers[f"drive.stages.{index}.lead"] / math.tau if kind == "screw_nut" else own["radius"]
         energy += 0.5 * own["inertia"] * speed**2 + 0.5 * own["mass"] * (way * speed) ** 2
         if kind not in {"screw_nut", "rack"}:
-            speed /= numbers[f"drive.stages.{index}.ratio"]
-            power *= numbers[f"drive.stages.{index}.efficiency"]
+            speed /= numbers.get(f"drive.stages.{index}.ratio", 1.0)
+            power *= numbers.get(f"drive.stages.{index}.efficiency", 1.0)
             energy += 0.5 * numbers[f"drive.stages.{index}.output_inertia"] * speed**2
     return energy + 0.5 * numbers["drive.inertia"] * speed**2, speed, power
 
