@@ -9,6 +9,13 @@ from typing_extensions import TypedDict
 from sprag_study.service.answers import Doc, Number
 
 
+class Prior(TypedDict):
+    """What was known of a parameter before the measurement, as a normal distribution."""
+
+    mean: Annotated[float, Doc("SI")]
+    sigma: Annotated[float, Doc("standard deviation, SI")]
+
+
 class CalibratedParameter(TypedDict):
     """An unknown parameter, or the gain or the offset of a sensor."""
 
@@ -23,6 +30,7 @@ class CalibratedParameter(TypedDict):
     deviation: Annotated[Number, Doc("standard deviation over the refits, SI; null without refits")]
     at_low: Annotated[bool, Doc("whether the interval reaches the lower end of the range")]
     at_high: Annotated[bool, Doc("whether the interval reaches the upper end of the range")]
+    prior: Annotated[Prior | None, Doc("null where none was given")]
 
 
 class CalibrationPoint(TypedDict):

@@ -76,6 +76,7 @@ def _parameter(found: Calibration, index: int) -> CalibratedParameter:
         "deviation": None if known is None or known.deviations is None else float(known.deviations[index]),
         "at_low": touching[0],
         "at_high": touching[1],
+        "prior": None if one.prior is None else {"mean": one.prior[0], "sigma": one.prior[1]},
     }
 
 

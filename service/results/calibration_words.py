@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -30,6 +31,10 @@ _MOST_OF: Final = 0.9
 _OFFSET_DEVIATIONS: Final = 5.0
 #: Standard deviations from which on a point is named.
 _FAR: Final = 4.0
+#: Share of its standard deviation before, from which on a parameter is hardly known better; standard deviations beyond
+#: which measured values contradict a prior.
+_NARROWER: Final = 0.8
+_CONTRADICTS: Final = 3.0
 #: Share of refits that may end before they converge without a word.
 _ENDED: Final = 0.25
 _MOST_POINTS: Final = 5
@@ -43,6 +48,7 @@ def sentences(found: Calibration) -> list[str]:
     return [
         *_doubts(found, known),
         *_deviations(found, known),
+        *_of_priors(found, known),
         *(_undetermined(found, one) for one in known.directions),
         *_bounds(found, known),
         *_refits(found, known),
@@ -59,6 +65,7 @@ def _doubts(found: Calibration, known: Answer) -> Iterator[str]:
     """Whether the model fits, and what in the measurement may be wrong."""
     yield from _fits(found)
     yield from _chi_square(found, known)
+    yield from _against_priors(found, known)
     yield from _shifted(found)
     yield from _points(found, known)
 
@@ -105,6 +112,40 @@ def _fits(found: Calibration) -> Iterator[Phrase]:
             "shows.",
             **values,
         )
+
+
+def _against_priors(found: Calibration, known: Answer) -> Iterator[Phrase]:
+    """Parameters whose priors the measured values contradict.
+
+    The difference of value and mean has the variance of the prior less that of the value, if both are right.
+    """
+    if known.deviations is None:
+        return
+    for place, one in enumerate(found.plan.unknown):
+        value, deviation = float(known.values[place]), float(known.deviations[place])
+        if one.prior is not None and deviation < _NARROWER * one.prior[1]:
+            mean, sigma = one.prior
+            apart = abs(value - mean) / math.sqrt(sigma**2 - deviation**2)
+            if apart > _CONTRADICTS:
+                yield Phrase(
+                    "Measured values and prior contradict each other in {name}: the value is {count} standard "
+                    "deviations from {mean}, beyond chance; check both before you use it.",
+                    name=found.called(place),
+                    count=Amount(apart, "1", 2, form=".2g"),
+                    mean=Amount(mean, found.unit(place), 4, form=".4g"),
+                )
+
+
+def _of_priors(found: Calibration, known: Answer) -> Iterator[Phrase]:
+    """Parameters of which hardly more is known than before."""
+    if known.deviations is None:
+        return
+    for place, one in enumerate(found.plan.unknown):
+        if one.prior is not None and known.deviations[place] >= _NARROWER * one.prior[1]:
+            yield Phrase(
+                "These points say hardly anything about {name}: its interval is that of the prior.",
+                name=found.called(place),
+            )
 
 
 def advised(found: Calibration) -> Offset | None:

@@ -21,6 +21,7 @@ from sprag_study.service.views.study_view import StudyAnswer, StudyView
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from sprag_study.service.answers.calibration import Prior
     from sprag_study.service.figures.figure import Figure
     from sprag_study.service.reading.reader import Reading
     from sprag_study.service.views.library import Library
@@ -75,8 +76,17 @@ def _ends(interval: Sequence[float] | None, unit: str) -> Cell:
     return None if interval is None else joined(" … ", [Amount(end, unit, 5, bare=True) for end in interval])
 
 
+def _prior(prior: Prior | None, unit: str) -> Cell:
+    """A prior of a table; None for none."""
+    if prior is None:
+        return None
+    values = {name: Amount(value, unit, 5) for name, value in (("mean", prior["mean"]), ("sigma", prior["sigma"]))}
+    return Phrase("{mean}, standard deviation {sigma}", **values)
+
+
 def _values(found: Calibration, report: CalibrationReport) -> ShownTable:
     rows: list[list[Cell]] = []
+    priors = any(one["prior"] for one in report["parameters"])
     for place, one in enumerate(report["parameters"]):
         own = (
             joined(" = ", map(Name, one["paths"])) if one["paths"] else joined("", [found.called(place, within=False)])
@@ -96,7 +106,10 @@ def _values(found: Calibration, report: CalibrationReport) -> ShownTable:
                 ),
             ]
         )
-    titles = (N_("Parameter"), N_("Value"), N_("95 % interval"), N_("Standard deviation"), N_("Range"))
+        if priors:
+            rows[-1].append(_prior(one["prior"], unit))
+    titles = [N_("Parameter"), N_("Value"), N_("95 % interval"), N_("Standard deviation"), N_("Range")]
+    titles += [N_("Known before")] if priors else []
     return ShownTable(Phrase("Values"), [Column(Phrase(title)) for title in titles], rows)
 
 

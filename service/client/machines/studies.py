@@ -133,7 +133,7 @@ class Studies(Draft):
         Parameters
         ----------
         unknown : values
-            What is unknown, each between two values; fields path, from, to.
+            What is unknown, each between two values; fields path, from, to, prior; needed: path, from, to.
         measured : table
             A frame, a mapping of columns or a sequence of mappings, as `cases` of `sprag.run`, or {"csv": text}; a cell
             without a value was not measured.

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from sprag_study.sentences import Amount, Sentence, plural
+from sprag_study.service.languages import N_
 from sprag_study.service.reading.limits import number_in, quoted
 from sprag_study.service.reading.texts import quantity_text
 from sprag_study.service.reading.units import parse_quantity
@@ -18,6 +19,7 @@ from sprag_study.service.spec.kinds.measured_points import MeasuredTable, read_r
 from sprag_study.service.spec.lists import refuse_mixed
 from sprag_study.service.spec.node import Node
 from sprag_study.service.spec.schema.quantity import QUANTITY
+from sprag_study.service.spec.shares import in_percent
 from sprag_study.worker.errors import WrongPlanError
 from sprag_study.worker.planning.calibrate.plan import (
     LOSSES,
@@ -57,7 +59,15 @@ _SENSORS: Final = Listed(
     "sensors", 1, MOST_SENSORS, "gain and offset of sensors, each of a measured result; others read it as it is",
     item=_SENSOR,
 )  # fmt: skip
-_UNKNOWN: Final = Record({"path": PATHS, "from": QUANTITY, "to": QUANTITY}, required=("path", "from", "to"))
+_SIGMA: Final = N_('its standard deviation: a quantity, or a share of the mean, as in "20 %"')
+_PRIOR: Final = Record(
+    {"mean": QUANTITY, "sigma": {**QUANTITY, "description": _SIGMA, "examples": ["0.002 N*m*s/rad", "20 %"]}},
+    "what is known of it before the measurement: a normal distribution, which counts as one more measured value",
+    required=("mean", "sigma"),
+)
+_UNKNOWN: Final = Record(
+    {"path": PATHS, "from": QUANTITY, "to": QUANTITY, "prior": _PRIOR}, required=("path", "from", "to")
+)
 _MEASURED: Final = Record({"csv": {"type": "string", "description": _CSV}}, required=("csv",))
 CALIBRATE: Final = Record(
     {
@@ -110,10 +120,30 @@ def _read_unknown(calibrate: Node) -> tuple[Unknown, ...] | None:
             path = item["path"]
             paths = read_path_of(path.holding(_expanded(path)))
             ends = None if paths is None else read_ends(item, paths, (item["from"], item["to"]))
-            unknown += [] if paths is None or ends is None else [Unknown(paths, *ends)]
+            if paths is not None and ends is not None:
+                unknown.append(Unknown(paths, *ends, _read_prior(item["prior"], paths, ends)))
     if node.sound:
         check_paths(node.report, [one.paths for one in unknown], node.pointer)
     return tuple(unknown) if node.sound else None
+
+
+def _read_prior(node: Node, paths: Sequence[str], ends: tuple[float, float]) -> tuple[float, float] | None:
+    """Mean and standard deviation in SI; None where there is no prior, or faults are recorded."""
+    if not node.given or not _PRIOR.read(node):
+        return None
+    parameters, (low, high) = [node.machine.parameters[path] for path in paths], ends
+    unit, share = parameters[0].unit, in_percent(node["sigma"].value)
+    mean = node["mean"].number_in(parameters)
+    if share is None:
+        sigma = node["sigma"].parsed(lambda given: parse_quantity(given, unit), allowed=_SIGMA, unit=unit)
+    else:
+        sigma = None if mean is None else share * abs(mean)
+    if mean is not None and not low <= mean <= high:
+        span = Sentence("{low} to {high}", low=Amount(low, unit, digits=6), high=Amount(high, unit, digits=6))
+        node["mean"].refuse("out-of-range", "lies outside of the range of the parameter", allowed=span)
+    if sigma is not None and sigma <= 0.0:
+        node["sigma"].refuse("out-of-range", "is out of range", allowed="above 0", unit=unit)
+    return None if mean is None or sigma is None else (mean, sigma)
 
 
 def _expanded(node: Node) -> object:
@@ -136,7 +166,9 @@ def _read_plan(
     sensors = _read_sensors(node, [one.result for one in measured])
     if sensors is None:
         return None
-    count, least = sum(len(one.values) for one in measured), len(unknown) + sum(len(one.unknown) for one in sensors) + 1
+    fitted = len(unknown) + sum(len(one.unknown) for one in sensors)
+    least = max(1, fitted + 1 - sum(one.prior is not None for one in unknown))
+    count = sum(len(one.values) for one in measured)
     if not least <= count <= MOST_MEASURED:
         text.refuse(
             "out-of-range", plural("has {count} measured value", "has {count} measured values", count), count,

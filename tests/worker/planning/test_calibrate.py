@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -230,6 +231,64 @@ def test_a_plan_names_what_is_wrong(change: dict[str, Any], named: str) -> None:
     with pytest.raises(ValueError, match=f"calibrate.{named}"):
         CalibratePlan(**(fields | change))
     assert CalibratePlan.from_json(plan.to_json()) == plan
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_prior_of_a_line_gives_the_posterior_of_linear_regression(known: bool) -> None:
+    y, sigma = _measured(_line), np.full(len(X), 0.3)
+    plan = plan_of([(-5.0, 5.0), (-5.0, 5.0)], X, {"y": y}, sigma if known else None, refits=1000)
+    mean, deviation = 0.9, 0.02
+    plan = replace(plan, unknown=(plan.unknown[0], replace(plan.unknown[1], prior=(mean, deviation))))
+    assert CalibratePlan.from_json(plan.to_json()) == plan
+    found = _answer(plan, _line)
+    design = np.stack([np.ones_like(X), X], axis=1) / found.sigma[:, None]
+    precision = design.T @ design + np.diag([0.0, 1.0 / deviation**2])
+    exact = np.linalg.solve(precision, design.T @ (y / found.sigma) + np.array([0.0, mean / deviation**2]))
+    spread = np.sqrt(np.diag(np.linalg.inv(precision)))
+    assert found.values == pytest.approx(exact, rel=1e-9)
+    # Of a scatter that follows from the residuals the deviations are those of Student's t with 14 degrees of freedom.
+    assert found.deviations == pytest.approx(spread * (1.0 if known else np.sqrt(14.0 / 12.0)), rel=0.08)
+    squares = np.sum(((y - found.modelled) / found.sigma) ** 2) + ((exact[1] - mean) / deviation) ** 2
+    assert (found.freedom, found.chi_square) == (len(X) - 1, pytest.approx(squares))
+    assert len(found.residuals) == len(found.leverages) == len(X)
+    if not known:
+        rest = (y - found.modelled) ** 2
+        assert found.sigma[0] == pytest.approx(np.sqrt(rest.sum() / (len(X) - 1)), rel=2e-3)
+
+
+def test_a_prior_counts_by_its_square_beside_any_loss() -> None:
+    y = _measured(_line)
+    y[3] += 2.0
+    sigma, prior = 0.03, (0.9, 0.01)
+    plan = plan_of([(-5.0, 5.0), (-5.0, 5.0)], X, {"y": y}, np.full(len(X), sigma), loss="cauchy", refits=0)
+    plan = replace(plan, unknown=(plan.unknown[0], replace(plan.unknown[1], prior=prior)))
+
+    def cost(place: Floats) -> float:
+        residuals = (y - place[0] - place[1] * X) / sigma
+        return float(np.sum(np.log1p(residuals**2)) + ((place[1] - prior[0]) / prior[1]) ** 2)
+
+    best = optimize.minimize(cost, TRUE, method="Nelder-Mead", options={"xatol": 1e-9, "fatol": 1e-12})
+    assert _answer(plan, _line).values == pytest.approx(best.x, rel=1e-6)
+
+
+def test_priors_determine_what_the_measurement_cannot_separate() -> None:
+    """Each keeps what is known of it, as far as the product allows."""
+
+    def product(parameters: Floats, at: Floats) -> dict[str, Floats]:
+        return {"y": parameters[:, 0] * parameters[:, 1] * at[:, 0]}
+
+    x = np.array([1.0, 2.0, 3.0])
+    plan = plan_of([(1.0, 3.0), (0.5, 1.5)], x, {"y": 1.6 * x}, np.full(3, 0.02), refits=200)
+    plan = replace(plan, unknown=tuple(
+        replace(one, prior=prior) for one, prior in zip(plan.unknown, [(2.0, 0.1), (0.9, 0.2)], strict=True)
+    ))  # fmt: skip
+    found = _answer(plan, product)
+    assert not found.directions
+    assert found.freedom == 3
+    assert found.values.prod() == pytest.approx(1.6, abs=0.02)
+    assert found.values[0] == pytest.approx(2.0, abs=0.1)
+    assert found.deviations is not None
+    assert found.deviations[0] == pytest.approx(0.1, rel=0.2)
 
 
 def test_an_offset_and_a_gain_are_fitted_beside_the_parameters_at_no_cost() -> None:

@@ -80,7 +80,7 @@ class NextPoint:
 
 @dataclass(frozen=True)
 class Answer:
-    """A calibration, as far as it has come; arrays of n measured values and p unknown parameters.
+    """A calibration, as far as it has come; arrays of n measured values and p numbers that are fitted.
 
     Attributes
     ----------
@@ -99,6 +99,7 @@ class Answer:
     failed : bool array, shape (n,)
         Where the fitted case has no result.
     chi_square : float
+        Priors included, as in the degrees of freedom.
     freedom : int
     refits : int
     directions : list of Direction
@@ -140,7 +141,7 @@ def answer(plan: CalibratePlan, space: Space, state: State) -> Answer | None:
     best = state.best
     if best is None:
         return None
-    data, failed = state.data, np.isnan(best.modelled[0])
+    data, failed, measured = state.data, np.isnan(best.modelled[0]), slice(plan.count)
     sigma = np.where(data.weights > 0.0, 1.0 / np.where(data.weights > 0.0, data.weights, 1.0), np.nan)
     residuals = np.where(failed, np.nan, -data.residuals(best.modelled)[0])
     places = None if state.refits is None else state.refits.places
@@ -164,20 +165,20 @@ def answer(plan: CalibratePlan, space: Space, state: State) -> Answer | None:
         at_bounds=at_bounds,
         deviations=None if values is None else values.std(axis=0, ddof=1),
         correlations=None if values is None else _correlations(values),
-        modelled=best.modelled[0],
-        sigma=sigma,
-        residuals=residuals,
-        leverages=leverage,
-        failed=failed,
+        modelled=best.modelled[0, measured],
+        sigma=sigma[measured],
+        residuals=residuals[measured],
+        leverages=leverage[measured],
+        failed=failed[measured],
         chi_square=float(squares.sum()),
         freedom=plan.freedom - int(failed.sum()),
         refits=0 if places is None else len(places),
         directions=directions,
-        next=_next(plan, state, values, sigma),
+        next=_next(plan, state, values, sigma[measured]),
         others=state.others if state.curve is not None else None,
         curve=state.curve,
         ribbon=_ribbon(state.curves),
-        ribbon_measured=None if state.refits is None or not enough else _ends(state.refits.modelled),
+        ribbon_measured=None if state.refits is None or not enough else _ends(state.refits.modelled[:, measured]),
         offsets=offsets(plan, residuals, sigma, leverage, best.derivatives[0]),
     )
 

@@ -37,6 +37,8 @@ _DISTINCT: Final = 0.1
 _WIDEST, _FARTHEST, _SHELLS, _IMPROBABLE = 0.5, 3.0, 3, 2.0
 #: By how much (in squares of standard deviations) another set must be better than the fit to begin again from there.
 _BEGIN_AGAIN: Final = 0.02
+#: Times that standard deviations beside priors follow from the residuals at most, and the relative change that ends it.
+_SCALED, _STEADY = 20, 1e-3
 #: Streams of random numbers of each scan of the ranges and the searches that follow it.
 _STREAMS: Final = 10
 
@@ -61,6 +63,8 @@ class State:
         Rounds of the phase.
     data : Data
         With the weights that hold now.
+    space : Space
+        Of what is fitted.
     best : Lanes, optional
         The best fit so far, alone.
     leverage : array, shape (measured,)
@@ -72,6 +76,7 @@ class State:
     """
 
     data: Data
+    space: Space
     phase: str = SCAN_PHASE
     round: int = 0
     best: Lanes | None = None
@@ -131,7 +136,7 @@ def _levelled(
     """
     places, read, place = places.copy(), modelled.copy(), len(plan.unknown)
     for one in plan.sensors:
-        rows = plan.places[1] == plan.results.index(one.result)
+        rows = np.flatnonzero(plan.places[1] == plan.results.index(one.result))
         gains, offsets = one.gain[0] < one.gain[1], one.offset[0] < one.offset[1]
         values = space.values(places)
         gain = values[:, place] if gains else np.full(len(values), one.gain[0])
@@ -187,11 +192,11 @@ def _taken(plan: CalibratePlan, state: State, found: Lanes) -> Generator[Request
 
 
 def _run(plan: CalibratePlan, state: State, phase: str, places: Floats) -> Generator[Request, Floats, Floats]:
-    """Modelled values of sets of parameters, shape (sets, measured)."""
+    """Modelled values of sets of parameters, then those parameters that have a prior, shape (sets, measured)."""
     state.phase, state.round = phase, state.round + 1 if phase == state.phase else 1
     conditions, columns = plan.places
     rows = yield Request(phase, places)
-    found = rows[:, conditions, columns]
+    found = np.hstack([rows[:, conditions, columns], state.space.values(places)[:, plan.priors]])
     state.library.append((places, found))
     return found
 
@@ -229,9 +234,13 @@ def _least(lanes: Lanes) -> Lanes:
 def _scaled(plan: CalibratePlan, state: State) -> Generator[Request, Floats, None]:
     """Take standard deviations that are not given from the residuals; where that changes the fit, fit again."""
     assert state.best is not None
-    rounds = 0 if plan.known_sigma else 1 if len(plan.measured) == 1 and plan.loss == "linear" else 3
-    for _ in range(rounds):
-        state.data = scaled_data(plan, state.best.modelled[0])
+    priors, alone = bool(len(plan.priors)), len(plan.measured) == 1 and plan.loss == "linear"
+    rounds = 0 if plan.known_sigma else 3 if not priors and not alone else _SCALED if priors else 1
+    for number in range(rounds):
+        scaled, before = scaled_data(plan, state.best.modelled[0]), state.data.weights
+        if priors and number and np.all(np.abs(scaled.weights - before) <= _STEADY * before):
+            break
+        state.data = scaled
         if rounds > 1:
             again = fit(state.data, state.best.places, state.best.modelled, plan.places_of(plan.fit_sets))
             state.best = _least((yield from _through(plan, state, FIT_PHASE, again)))

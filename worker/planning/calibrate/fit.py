@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sprag_study.worker.planning.calibrate.batches import bounded_steps, normal, total
-from sprag_study.worker.planning.calibrate.losses import slopes
 from sprag_study.worker.planning.calibrate.plan import MOST_ITERATIONS
 
 if TYPE_CHECKING:
@@ -73,7 +72,7 @@ class Lanes:
 def quadratic(data: Data, modelled: Floats, derivatives: Floats) -> tuple[Floats, Floats]:
     """Gradient (sets, p) and curvature (sets, p, p) of the cost."""
     residuals = data.residuals(modelled)
-    first, curved = slopes(data.loss, residuals)
+    first, curved = data.slopes(residuals)
     gradient = total(derivatives * (first * residuals * data.weights)[:, :, None])
     return gradient, normal(derivatives, curved * data.weights * data.weights)
 

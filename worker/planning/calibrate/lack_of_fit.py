@@ -222,8 +222,9 @@ def offsets(
     Parameters
     ----------
     plan : CalibratePlan
-    residuals, sigma, leverages : float64 arrays, shape (measured,)
-    derivatives : float64 array, shape (measured, parameters)
+    residuals, sigma, leverages : float64 arrays, shape (values,)
+        Of the measured values, then of priors.
+    derivatives : float64 array, shape (values, parameters)
         Of the modelled values, by the parameters.
     """
     from scipy.special import chdtrc, fdtrc
@@ -239,7 +240,8 @@ def offsets(
     squares = float(rest @ rest)
     results: list[Offset] = []
     for column in range(len(plan.measured)):
-        shift = np.where(plan.places[1] == column, weights, 0.0)
+        rows, shift = np.flatnonzero(plan.places[1] == column), np.zeros_like(weights)
+        shift[rows] = weights[rows]
         apart = shift - vectors @ (vectors.T @ shift)
         size = float(apart @ apart)
         if np.count_nonzero(shift) < _LEAST_VALUES or size < _IMITATED * float(shift @ shift):
@@ -251,8 +253,8 @@ def offsets(
         if plan.known_sigma:
             after = float(chdtrc(freedom - 1, max(squares - fall, 0.0)))
         else:
-            left = np.where(known, left, np.nan)
-            test = lack_of_fit(plan, left, sigma, np.minimum(leverages + apart**2 / size, 1.0))
+            left, leverage = np.where(known, left, np.nan), np.minimum(leverages + apart**2 / size, 1.0)
+            test = lack_of_fit(plan, left[: plan.count], sigma[: plan.count], leverage[: plan.count])
             after = 1.0 if test is None else test.p
         p, share = min(1.0, p * len(plan.measured)), float(fall / squares)
         results.append(Offset(column, value, math.sqrt(scatter / size), p, share, after))

@@ -44,11 +44,15 @@ LOGARITHMIC: Final = 10.0
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """A parameter, or several tied ones, that is to be found between ``low`` and ``high``, SI."""
+    """A parameter, or several tied ones, that is to be found between ``low`` and ``high``, SI.
+
+    ``prior`` is what is known of it before the measurement: mean and standard deviation of a normal distribution, SI.
+    """
 
     paths: tuple[str, ...]
     low: float
     high: float
+    prior: tuple[float, float] | None = None
 
     @property
     def logarithmic(self) -> bool:
@@ -132,6 +136,9 @@ class CalibratePlan:
         for i, one in enumerate(self.unknown):
             ends = math.isfinite(one.low) and math.isfinite(one.high) and one.low < one.high
             _check(bool(one.paths) and ends, f"unknown.{i}", (one.low, one.high), "paths, and a range")
+            mean, deviation = one.prior or (0.0, 1.0)
+            certain = math.isfinite(mean) and 0.0 < deviation < math.inf
+            _check(certain, f"unknown.{i}.prior", one.prior, "a finite mean and a positive standard deviation")
         _check_sensors(self)
         _check_measured(self)
         _check(self.loss in LOSSES, "loss", self.loss, ", ".join(LOSSES))
@@ -178,16 +185,21 @@ class CalibratePlan:
 
     @property
     def freedom(self) -> int:
-        """Degrees of freedom: measured values less unknown parameters, gains and offsets."""
-        return self.count - len(self.fitted)
+        """Degrees of freedom: measured values and priors less unknown parameters, gains and offsets."""
+        return self.count + len(self.priors) - len(self.fitted)
 
     @property
     def scales(self) -> dict[int, int]:
         """Degrees of freedom of each standard deviation that follows from residuals, by the position of its result."""
-        left = self.freedom / self.count
+        left = min(self.freedom / self.count, 1.0)
         return {
             column: max(1, round(left * len(one.values))) for column, one in enumerate(self.measured) if not one.sigma
         }
+
+    @cached_property
+    def priors(self) -> Ints:
+        """Positions of the unknown parameters that have a prior."""
+        return np.array([place for place, one in enumerate(self.unknown) if one.prior is not None], dtype=np.int64)
 
     @property
     def scan(self) -> int:
@@ -260,7 +272,7 @@ class CalibratePlan:
         try:
             return cls(
                 unknown=tuple(
-                    Unknown(tuple(map(str, one["paths"])), float(one["low"]), float(one["high"]))
+                    Unknown(tuple(map(str, one["paths"])), float(one["low"]), float(one["high"]), _prior(one))
                     for one in data["unknown"]
                 ),
                 paths_at=tuple(map(str, data["paths_at"])),
@@ -278,7 +290,11 @@ class CalibratePlan:
         """The plan as plain JSON data, from which ``from_json`` makes an equal one."""
         return {
             "kind": CALIBRATE,
-            "unknown": [{"paths": list(one.paths), "low": one.low, "high": one.high} for one in self.unknown],
+            "unknown": [
+                {"paths": list(one.paths), "low": one.low, "high": one.high}
+                | ({"prior": list(one.prior)} if one.prior else {})
+                for one in self.unknown
+            ],
             "paths_at": list(self.paths_at),
             "conditions": [list(one) for one in self.conditions],
             "measured": [
@@ -290,6 +306,13 @@ class CalibratePlan:
             "refits": self.refits,
             "seed": self.seed,
         } | ({"sensors": [_sensor_json(one) for one in self.sensors]} if self.sensors else {})
+
+
+def _prior(data: Mapping[str, Any]) -> tuple[float, float] | None:
+    if "prior" not in data:
+        return None
+    mean, deviation = map(float, data["prior"])
+    return mean, deviation
 
 
 def _measured(data: Mapping[str, Any]) -> Measured:
@@ -337,7 +360,7 @@ def _check_measured(plan: CalibratePlan) -> None:
     _check(len(set(plan.conditions)) == len(plan.conditions), "conditions", len(plan.conditions), "each once")
     _check(bool(plan.measured), "measured", [], "at least one result")
     _check(len(set(plan.results)) == len(plan.results), "measured", list(plan.results), "each result once")
-    least = len(plan.fitted) + 1
+    least = max(1, len(plan.fitted) + 1 - len(plan.priors))
     _check(least <= plan.count <= MOST_MEASURED, "measured", plan.count, f"{least} to {MOST_MEASURED:,} values")
     for one in plan.measured:
         lengths = {len(one.at), len(one.values), len(one.sigma) or len(one.at)}

@@ -32,8 +32,8 @@ class CalibratePlanner:
 
     def __init__(self, plan: CalibratePlan) -> None:
         self.plan = plan
-        self.state = State(first_data(plan))
         self._space = Space(plan.fitted)
+        self.state = State(first_data(plan), self._space)
         self._known: dict[bytes, dict[bytes, Floats]] = {}
         self._cases = self._rounds = 0
         self._course = course(plan, self._space, self.state)

@@ -61,19 +61,22 @@ def drawn(
     Where the standard deviations are given (no ``scales``) and the loss is linear: the ``modelled`` values with normal
     noise. Otherwise residuals of the fit, drawn with replacement, each divided by the root of 1 less its ``leverage``.
     Where the standard deviation of a result, one of the ``columns`` (measured,), is only known from so many degrees of
-    freedom (``scales``), each set has its own, by a distribution of chi-square.
+    freedom (``scales``), each set has its own, by a distribution of chi-square. Priors always
+    have normal noise.
     """
     used = data.weights > 0.0
     scale = np.where(used, 1.0 / np.where(used, data.weights, 1.0), 0.0)
     if not scales and data.loss == "linear":
         return modelled + draws.normals(count, len(modelled)) * scale
-    residuals = data.residuals(modelled)[used] / np.sqrt(np.maximum(1.0 - leverage[used], 0.05))
+    noise, rows = np.zeros((count, len(modelled))), np.flatnonzero(used[: len(columns)])
+    residuals = data.residuals(modelled)[rows] / np.sqrt(np.maximum(1.0 - leverage[rows], 0.05))
     residuals = residuals - _centre(data.loss, residuals)
-    noise = np.zeros((count, len(modelled)))
-    noise[:, used] = residuals[draws.integers(len(residuals), count, len(residuals))]
+    noise[:, rows] = residuals[draws.integers(len(residuals), count, len(residuals))]
     for column, freedom in scales.items():
         normals = draws.normals(count, freedom)
-        noise[:, columns == column] *= np.sqrt(freedom / total(normals * normals))[:, None]
+        noise[:, np.flatnonzero(columns == column)] *= np.sqrt(freedom / total(normals * normals))[:, None]
+    if data.priors:
+        noise[:, len(columns) :] = draws.normals(count, data.priors)
     return modelled + noise * scale
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
 from sprag_study.service.http.web.form.check import Checked
-from sprag_study.service.http.web.form.entries import Faults, Values
+from sprag_study.service.http.web.form.entries import Faults, Values, plain, text_of
 from sprag_study.service.http.web.form.fields import Choice, Groups, described, grouped_results
 from sprag_study.service.http.web.form.machine import grouped
 from sprag_study.service.http.web.form.spec import PATHS, RANGE, RESULT, number_or_range
@@ -17,6 +17,7 @@ from sprag_study.service.http.web.form.walk import Cell, Filled, Record, Rows
 from sprag_study.service.http.web.form.walk import described as members
 from sprag_study.service.languages import _, gettext
 from sprag_study.service.reading.catalogue import unit_of
+from sprag_study.service.reading.deviations import with_tolerance
 from sprag_study.service.reading.reader import Reading
 from sprag_study.service.reading.wording import number
 from sprag_study.service.results.calibration_words import further
@@ -40,13 +41,19 @@ _AT_FIRST: Final = {"unknown": 2, "sensors": 1}
 _CSV: Final = Cell(
     ("csv",), ("csv",), lambda form: {"csv": form.values.get(POINTS, "")}, lambda item: {"csv": str(item["csv"])}
 )  # fmt: skip
+_PRIOR: Final = Cell(
+    ("prior",), ("prior",),
+    lambda form: {"prior": _prior(text)} if (text := form.text("prior")) else {},
+    lambda item: {"prior": "{} ± {}".format(*map(text_of, (given["mean"], given["sigma"])))}
+    if (given := item.get("prior")) else {},
+)  # fmt: skip
 #: Lists of rows that users add and remove, by the name of the field with their number.
 PARTS: Final = {
     rows.name: rows
     for rows in (
         Rows(
             "unknown", "/calibrate/unknown", CALIBRATE.listed["unknown"].high,
-            Record((PATHS, RANGE), whole="/path"), always=False, whole="/calibrate/unknown/0/path",
+            Record((PATHS, RANGE, _PRIOR), whole="/path"), always=False, whole="/calibrate/unknown/0/path",
         ),
         Rows(
             "sensors", "/calibrate/sensors", CALIBRATE.listed["sensors"].high,
@@ -58,6 +65,12 @@ _CALIBRATE: Final = Record(
     (*PARTS.values(), Record((_CSV,), key="measured"), *members(_RARE.values())), whole="",
     key="calibrate",
 )  # fmt: skip
+
+
+def _prior(text: str) -> dict[str, Any]:
+    """Mean and standard deviation of ``9.5 N/mm ± 5 %``; where there is one number only, the mean."""
+    both = with_tolerance(text) or (text,)
+    return dict(zip(("mean", "sigma"), map(plain, both), strict=False))
 
 
 def form_with_spec(spec: Mapping[str, Any], values: Values) -> tuple[dict[str, Any], Filled]:

@@ -122,6 +122,29 @@ def test_an_offset_that_is_calibrated_has_an_interval_on_every_front(service: Se
     assert service.http.get(f"{API}/studies/{study_id}/report?format=html").status_code == 200
 
 
+def test_priors_stand_beside_their_values_and_contradictions_are_told(service: Service) -> None:
+    known = {"mean": DAMPING, "sigma": "0.01 %"}
+    wrong = {"mean": 2.4 * INERTIA, "sigma": 0.25 * INERTIA}
+    damping, inertia = CALIBRATE["unknown"]
+    study_id = calibration(service, unknown=[{**damping, "prior": known}, {**inertia, "prior": wrong}], refits=60)
+    found = service.get(f"/studies/{study_id}/calibration")
+    fits(CalibrationReport, found)
+    assert [one["prior"] for one in found["parameters"]] == [
+        {"mean": DAMPING, "sigma": pytest.approx(1e-4 * DAMPING)}, wrong,
+    ]  # fmt: skip
+    assert found["freedom"] == 10
+    assert found["sentences"][1].startswith(
+        "Measured values and prior contradict each other in shaft.inertia: the value"
+    )
+    assert (
+        "These points say hardly anything about pendulums.0.damping: its interval is that of the prior."
+        in (found["sentences"])
+    )
+    page = service.http.get(f"/studies/{study_id}/matters").text
+    assert "Known before" in page
+    assert "Measured values and prior contradict each other in " in page
+
+
 def test_a_value_far_off_the_others_is_named_with_its_condition(service: Service) -> None:
     lines = measured(sigma=False).splitlines()
     place, value = lines[4].rsplit(",", 1)

@@ -58,17 +58,21 @@ def test_pasted_points_become_a_study(service: Service) -> None:
     assert 'value="pendulums.0.damping"' in empty.text
     sensor = {"result": "shaft.speed.mean", "gain": "1,02", "offset": "-1 to 1 rad/s"}
     fields = filled(study_id, loss="huber", **{f"sensors/1/{name}": text for name, text in sensor.items()})
+    fields["/calibrate/unknown/0/prior"] = "0,012 ± 20 %"
     sent = service.http.post("/calibrate", data=fields, follow_redirects=False)
     assert sent.status_code == 303, sent.text
     made = sent.headers["location"].rpartition("/")[2]
     plan = service.store.studies.study(made).plan
     offset = {"from": "-1 rad/s", "to": "1 rad/s"}
     sensors = [{"result": "shaft.speed.mean", "gain": 1.02, "offset": offset}]
-    expected = service.store.studies.study(service.submit(spec_of(loss="huber", refits=200, sensors=sensors))).plan
+    damping, inertia = CALIBRATE["unknown"]
+    unknown = [{**damping, "prior": {"mean": 0.012, "sigma": "20 %"}}, inertia]
+    spec = spec_of(loss="huber", refits=200, sensors=sensors, unknown=unknown)
+    expected = service.store.studies.study(service.submit(spec)).plan
     assert plan == expected
     # Its fields are those of a further calibration.
     further = service.http.get(f"/studies/{made}/matters?ask=measurement&again=on").text
-    for text in ("-1 to 1 rad/s", "0.5e-3 kg*m^2", "pendulums.*.damping"):
+    for text in ("-1 to 1 rad/s", "0.5e-3 kg*m^2", "pendulums.*.damping", "0.012 ± 20 %"):
         assert f'value="{text}"' in further
     assert '<option value="huber" selected>' in further
     assert 'id="sensors" open' in further
@@ -104,6 +108,8 @@ def test_faults_of_pasted_points_are_beside_their_fields(service: Service) -> No
     for changes, told, wrong in (
         ({"measured/csv": "shaft.load;shaft.speed.mean\n0,1;x\n0,2;20\n"}, "line 2, column shaft.speed.mean", CSV),
         ({"unknown/2/path": "pendulums.0.mass", "unknown/2/to": "1"}, "is required", "/calibrate/unknown/2/from"),
+        ({"unknown/0/prior": "0.012"}, "is required", "/calibrate/unknown/0/prior"),
+        ({"unknown/0/prior": "1 ± 0.1"}, "lies outside of the range", "/calibrate/unknown/0/prior"),
         ({"sensors/1/gain": "1.1"}, "is required", "/calibrate/sensors/1/result"),
         ({"sensors/1/result": "shaft.speed.mean", "sensors/1/gain": "x"}, "got x", "/calibrate/sensors/1/gain"),
         ({"refits": "many"}, "must be a whole number", "/calibrate/refits"),

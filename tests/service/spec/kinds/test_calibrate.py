@@ -228,6 +228,38 @@ def test_gains_and_offsets_count_among_the_unknowns() -> None:
     assert str(error.value.faults[0].allowed).startswith("4 to ")
 
 
+_DAMPED = {"path": "pendulums.0.damping", "from": 0.002, "to": 0.05}
+
+
+def test_priors_are_read_in_si_and_count_as_measured_values() -> None:
+    damping = {**_DAMPED, "prior": {"mean": "0.012 N*m*s/rad", "sigma": "20 %"}}
+    arm = {"path": "pendulums.0.arm", "from": "20 mm", "to": "40 mm", "prior": {"mean": "3 cm", "sigma": "0.5 mm"}}
+    plan = parse_spec(
+        spec_of({"unknown": [damping, arm, {"path": "shaft.inertia", "from": 1e-3, "to": 2e-2}]})
+    ).study.plan
+    assert plan is not None
+    assert [one.get("prior") for one in plan["unknown"]] == [
+        pytest.approx([0.012, 0.0024]), pytest.approx([0.03, 0.0005]), None,
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("prior", "where", "code"),
+    [
+        ({"mean": 0.01}, "/sigma", "required"),
+        ({"mean": 0.1, "sigma": "10 %"}, "/mean", "out-of-range"),
+        ({"mean": 0.01, "sigma": 0}, "/sigma", "out-of-range"),
+        ({"mean": 0.01, "sigma": "1 mm"}, "/sigma", "wrong-unit"),
+        ({"mean": 0.01, "sigma": 0.001, "kind": "normal"}, "/kind", "unknown-field"),
+        ("0.01 +- 0.001", "", "wrong-type"),
+    ],
+)
+def test_faults_of_a_prior(prior: Any, where: str, code: str) -> None:
+    with pytest.raises(SpecError) as error:
+        parse_spec(spec_of({"unknown": [{**_DAMPED, "prior": prior}]}))
+    assert (f"/calibrate/unknown/0/prior{where}", code) in [(fault.where, fault.code) for fault in error.value.faults]
+
+
 @pytest.mark.parametrize("name", ["axes", "goal", "refine", "tolerances"])
 def test_a_calibration_stands_alone(name: str) -> None:
     with pytest.raises(SpecError) as error:
