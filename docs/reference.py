@@ -20,6 +20,7 @@ from sprag_study.engine.formulas.expressions import MAX_LENGTH
 from sprag_study.engine.vibration_drive.examined import MAX_PERIODS
 from sprag_study.engine.vibration_drive.force_results import force_infos
 from sprag_study.engine.vibration_drive.load_results import load_infos
+from sprag_study.engine.vibration_drive.ramps import start_up_infos
 from sprag_study.service.cli.app import command_line
 from sprag_study.service.cli.console import ExitCode
 from sprag_study.service.cli.settings import VARIABLES
@@ -93,6 +94,12 @@ def results(model: str, besides: Container[str] | None = None) -> Iterator[Row]:
 def forces() -> Iterator[Row]:
     """Every result of the forces of a case."""
     for info in force_infos(1):
+        yield f"`{info.name.replace('pendulums.0.', 'pendulums.N.')}`", info.unit, info.description
+
+
+def start_ups() -> Iterator[Row]:
+    """Every result of the start-up of a case."""
+    for info in start_up_infos(1):
         yield f"`{info.name.replace('pendulums.0.', 'pendulums.N.')}`", info.unit, info.description
 
 
@@ -200,6 +207,7 @@ TABLES: dict[str, tuple[str, Iterable[Row]]] = {
     "results of cases with forces and duty": ("result | unit | meaning ", results(DRIVE, LOADS)),
     "results of machine shafts with loads": ("result | unit | meaning ", results(models.MACHINE_SHAFT, SHAFT_LOADS)),
     "forces of a case": ("result | unit | meaning ", forces()),
+    "start-up of a case": ("result | unit | meaning ", start_ups()),
     "regimes": ("regime | meaning ", meanings(models.REGIME_SENTENCES)),
     "endings": ("ending | ", meanings(dict(models.ENDING_SENTENCES))),
     "flags": ("flag | ", meanings({k: v for name in models.model_names() for k, v in models.flags_of(name).items()})),

@@ -25,6 +25,7 @@ from sprag_study.worker.directions import DIRECTIONS
 from sprag_study.worker.models.forces import force_infos
 from sprag_study.worker.models.machine_shaft import REMARKS
 from sprag_study.worker.models.model import Model
+from sprag_study.worker.models.ramps import start_up_infos
 from sprag_study.worker.models.registry import all_models
 from sprag_study.worker.models.transients import RESULTS as TRANSIENT_RESULTS
 from sprag_study.worker.models.vocabulary import caption, caption_texts
@@ -60,7 +61,7 @@ def vocabulary() -> Iterator[str]:
     yield from (end.sentence for end in End)
     yield from (*models.ENDING_SENTENCES.values(), *models.REGIME_SENTENCES.values())
     yield from (meaning for _name, _unit, meaning in TRANSIENT_RESULTS)
-    yield from (info.description for info in force_infos(1))
+    yield from (info.description for info in (*force_infos(1), *start_up_infos(1)))
     yield from (state.sentence for state in StudyState)
     yield from (kind.title for kind in KINDS)
     for meanings in (MEANINGS, KIND_MEANINGS, WARNING_MEANINGS):

@@ -14,6 +14,7 @@ from packaging.requirements import Requirement
 
 from sprag_study.engine.machine_shaft.results import MACHINE_RESULTS
 from sprag_study.engine.vibration_drive.force_results import force_infos
+from sprag_study.engine.vibration_drive.ramps import start_up_infos
 from sprag_study.engine.vibration_drive.regimes import settled_infos
 from sprag_study.service.cli.app import command_line
 from sprag_study.service.cli.old_words import GONE, OLD
@@ -117,7 +118,7 @@ def test_links_lead_somewhere(page: Path) -> None:
 
 
 def test_results_that_the_pages_name_exist() -> None:
-    names = {info.name for info in (*settled_infos(8), *force_infos(8), *MACHINE_RESULTS)}
+    names = {info.name for info in (*settled_infos(8), *force_infos(8), *start_up_infos(8), *MACHINE_RESULTS)}
     names |= {re.sub(r"\d", "N", name) for name in names}
     pattern = r"\b((?:shaft|torque|power|fraction|balance|reset|runup|clutches)\.(?!md\b)[a-z_]+(?:\.[a-z_]+)*)\b"
     # With the objects whose rows have numbers.

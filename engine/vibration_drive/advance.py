@@ -72,6 +72,16 @@ class _Advance:
         self.require(f"abs({phi_end}) < {ANGLE_BOUND!r}")
         self.require(f"abs({w_end}) < {SPEED_BOUND!r}")
 
+    def ramps(self) -> None:
+        """Move phase and frequency of the excitation, and the factor on the load."""
+        layout, code = self.layout, self.code
+        rate, slope = code.load("rate", layout.phase_rate), code.load("slope", layout.phase_slope)
+        gained = code.let("gained", f"({rate} + 0.5*{slope}*{self.taken})*{self.taken}*{0.5 / math.pi!r}")
+        phase = code.let("phase", f"{code.row(layout.phase)} + {gained}")
+        code.store(layout.phase, f"{phase} - (({phase} + {ROUND}) - {ROUND})")
+        self.add(layout.phase_rate, f"{slope}*{self.taken}")
+        self.add(layout.load_factor, f"{code.row(layout.load_slope)}*{self.taken}")
+
     def shaft_and_clock(self) -> None:
         """Move the shaft and the clock; determine whether the lane needs attention."""
         layout, code = self.layout, self.code
@@ -99,6 +109,8 @@ class _Advance:
             cycle = code.let("cycle", f"{code.row(layout.cycle)} + {code.row(layout.cycles)}*{turned}")
             whole = code.let("whole", f"({cycle}*{0.5 / math.pi!r} + {ROUND}) - {ROUND}")
             code.store(layout.cycle, f"{cycle} - {whole}*{2.0 * math.pi!r}")
+        if layout.ramped:
+            self.ramps()
         speed_end = code.let("speed_end", horner(self.shaft, self.x))
         code.store(layout.speed, speed_end)
         self.add(layout.f, f"{self.taken}/{code.row(layout.period)}")

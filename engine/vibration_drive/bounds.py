@@ -128,7 +128,7 @@ class _Watch:
         if layout.n > 1:
             total = [code.let("S", " + ".join(parts)) for parts in zip(*self.torques, strict=True)]
         sums = span(code, "S", total)
-        self.guard(sums, edges, None, layout.sum_high)
+        self.guard(self._held_excess(total) if layout.ramped else sums, edges, None, layout.sum_high)
         if layout.n > 1:
             self.peak(sums, block, layout.sum_max)
         corners = [code.let("corner", f"({a})*({b})") for a in (sums.low, sums.high) for b in (speeds.low, speeds.high)]
@@ -143,6 +143,14 @@ class _Watch:
             rising = f"({code.row(layout.generator)} + {code.row(layout.quadratic)}*{fastest})*{fastest}"
             most = f"({code.row(layout.load)} + {rising} + ({curve.high}))*{fastest}"
             self._exceed(layout.useful_max + block, f"{most} - {code.row(layout.useful_max)}")
+
+    def _held_excess(self, total: list[Term]) -> Span:
+        """The sum of the torques less the changing load that holds the shaft, as `states.held_excess`."""
+        layout, code = self.layout, self.code
+        held = code.load("held", layout.held_load)
+        value = code.let("excess_0", f"{total[0]} - {code.row(layout.load_factor)}*{held}")
+        rate = code.let("excess_1", f"{total[1]} - {code.row(layout.load_slope)}*{held}*{self.h}")
+        return span(code, "X", [value, rate, *total[2:]])
 
 
 def bounds_loop(layout: Layout) -> str:

@@ -54,6 +54,11 @@ class Column(IntEnum):
     INVERSE_RATE = auto()
     SPEED = auto()
     MOST_STEPS = auto()
+    PHASE = auto()
+    PHASE_RATE = auto()
+    PHASE_SLOPE = auto()
+    LOAD_FACTOR = auto()
+    LOAD_SLOPE = auto()
 
 
 class PendulumColumn(IntEnum):
@@ -302,7 +307,9 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
     array, shape (cases, columns)
         `Column`: nu, period, d nu^2, b nu^2, chi, largest accelerations of the base in x and y, highest order of its
         harmonics, room for harmonics, g, M_c, lambda_e, k_1, k_2, M_s, 1/omega_s, kappa M_c, m, psi, J_e,
-        1/rate, initial speed, step budget; the table of the load; four stops; per pendulum `PendulumColumn`: M l/J,
+        1/rate, initial speed, step budget, and for kernels with ramps phase of the excitation in turns, its angular
+        frequency and the rate of that, factor on the load and the rate of that; the table of the load; four stops; per
+        pendulum `PendulumColumn`: M l/J,
         c a^2/J, lambda/J, 1/J, J, delta, u_end, lambda_k, lambda_o, initial angle, speed, windup and state of the
         clutch; its clutch coefficients. Per harmonic `HarmonicColumn`.
     """
@@ -378,6 +385,8 @@ def case_matrix(columns: Mapping[str, ArrayLike], run: Run, cases: int) -> Float
         C.CYCLE: parameter("shaft.load_phase"),
         C.INERTIA: shaft_inertia, C.INVERSE_RATE: 1.0 / rate, C.SPEED: parameter("shaft.initial_speed"),
         C.MOST_STEPS: run.step_budget(cycles),
+        C.PHASE: np.zeros(cases), C.PHASE_RATE: nu, C.PHASE_SLOPE: np.zeros(cases),
+        C.LOAD_FACTOR: np.ones(cases), C.LOAD_SLOPE: np.zeros(cases),
     }  # fmt: skip
     stops = [part for time in times for part in _stop(time)]
     table = load_table(columns, cases)

@@ -36,6 +36,7 @@ from sprag_study.engine.vibration_drive.formulas import (
     drive,
     free_acceleration,
     harmonic_series,
+    ramped_series,
     resistance,
 )
 from sprag_study.engine.vibration_drive.layout import Layout
@@ -48,6 +49,8 @@ STEP_SAFETY = 0.66
 LONGEST_STEP = 0.25
 #: Share of the base's largest drive that counts as motion in any case when a step's error is weighed.
 DRIVE_SHARE = 1e-3
+#: Rows that a load with a factor that changes reads.
+RAMPED_LOAD = ("load_factor", "generator", "quadratic", "load_slope")
 #: Speed of the shaft over that of a load that falls with it, from which on the load is nothing: e^-60 of that at rest.
 NOTHING = 60.0
 
@@ -91,6 +94,8 @@ class _Pendulum:
 
 def _excitation(code: LaneCode, layout: Layout) -> tuple[list[Term], list[Term]]:
     """Series of the base's accelerations (2), with those of its harmonics."""
+    if layout.ramped:
+        return _ramped_excitation(code, layout)
     names = ("f", "nu", "acc_x", "acc_y", "cos_chi", "sin_chi")
     f, nu, acc_x, acc_y, cos_chi, sin_chi = (code.load(name, getattr(layout, name)) for name in names)
     s, c = sincos(code, code.let("theta", f"6.283185307179586*{f}"), "t")
@@ -129,6 +134,60 @@ def _harmonic(code: LaneCode, layout: Layout, index: int) -> tuple[list[Term], l
         factor = code.let("m_factor", f"{square_rate}*{-1.0 / (k * (k - 1))!r}")
         x.append(code.let(f"MX{k}", f"{factor}*{x[k - 2]}"))
         y.append(code.let(f"MY{k}", f"{factor}*{y[k - 2]}"))
+    return x, y
+
+
+def _ramped_excitation(code: LaneCode, layout: Layout) -> tuple[list[Term], list[Term]]:
+    """Series of the accelerations of a base whose frequency changes, with those of its harmonics."""
+    code.load("f", layout.f)
+    turns, rate, slope = (code.load(name, getattr(layout, name)) for name in ("phase", "phase_rate", "phase_slope"))
+    nu, cos_chi, sin_chi = (code.load(name, getattr(layout, name)) for name in ("nu", "cos_chi", "sin_chi"))
+    per = code.let("per", f"1.0/({nu}*{nu})")
+    b = code.let("b", f"{code.row(layout.acc_y)}*{per}")
+    factors: tuple[Term, ...] = (
+        code.let("d", f"{code.row(layout.acc_x)}*{per}"),
+        Term("0.0"),
+        b * sin_chi,
+        b * cos_chi,
+    )
+    x, y = _ramped_part(code, layout.order, factors, turns, (rate, slope))
+    for index in range(layout.harmonics):
+        order = code.load("m", layout.harmonic_order + index)
+        square = code.let("m_square", f"{order}*{order}")
+        scale = code.let("m_per", f"-{per}/({larger(square, '1.0')})")  # of no harmonic the order is 0
+        rows = (getattr(layout, f"harmonic_{name}") + index for name in ("x_cos", "x_sin", "y_cos", "y_sin"))
+        factors = tuple(code.let("m_factor", f"{code.row(row)}*{scale}") for row in rows)
+        motion = code.let("m_rate", f"{order}*{rate}"), code.let("m_slope", f"{order}*{slope}")
+        further = _ramped_part(code, layout.order, factors, code.let("m_turns", f"{order}*{turns}"), motion)
+        x, y = (
+            [code.let("base", f"{one} + {other}") for one, other in zip(*pair, strict=True)]
+            for pair in ((x, further[0]), (y, further[1]))
+        )
+    return x, y
+
+
+def _ramped_part(
+    code: LaneCode, order: int, factors: tuple[Term, ...], turns: Term, motion: tuple[Term, Term]
+) -> tuple[list[Term], list[Term]]:
+    """Series of the accelerations in x and y of one part of the motion of the base, as `formulas.ramped_series`.
+
+    Sine and cosine of theta, which is at ``turns`` now, have (sin)' = theta' cos and (cos)' = -theta' sin; the
+    acceleration is the second derivative of the displacement, whose coefficients they give.
+    """
+    rate, slope = motion
+    part = code.let("part", f"{turns} - (({turns} + {ROUND}) - {ROUND})")
+    sin, cos = ([term] for term in sincos(code, code.let("theta", f"6.283185307179586*{part}"), "t"))
+    x_cos, x_sin, y_cos, y_sin = (code.let("factor", factor) for factor in factors)
+    first_x, first_y = ramped_series(x_cos, x_sin, y_cos, y_sin, motion, sin[0], cos[0])
+    x = [code.let("X", term) for term in first_x]
+    y = [code.let("Y", term) for term in first_y]
+    for k in range(1, order + 2):
+        turned = [f"({rate}*{other[k - 1]}" + (f" + {slope}*{other[k - 2]})" if k > 1 else ")") for other in (cos, sin)]
+        sin.append(code.let("sine", f"{turned[0]}*{1.0 / k!r}"))
+        cos.append(code.let("cosine", f"{turned[1]}*{-1.0 / k!r}"))
+        if k > 3:
+            x.append(code.let("X", f"({x_cos}*{cos[k]} + {x_sin}*{sin[k]})*{float(k * (k - 1))!r}"))
+            y.append(code.let("Y", f"({y_cos}*{cos[k]} + {y_sin}*{sin[k]})*{float(k * (k - 1))!r}"))
     return x, y
 
 
@@ -233,7 +292,8 @@ def series_loop(layout: Layout) -> str:
 class _Curve:
     """Series of B, the terms of the load that are no polynomial of the speed.
 
-    Of a table, the line level + slope shaft on which the speed is belongs to it: its corners are events.
+    Of a table, the line level + slope shaft on which the speed is belongs to it: its corners are events. Of a load with
+    a factor s that changes linearly in time, s - 1 times the whole load belongs to it.
     y = M_s exp(-shaft/omega_s) has y' = -(shaft'/omega_s) y, and sine and cosine of theta have (sin)' = m shaft cos.
     """
 
@@ -244,7 +304,9 @@ class _Curve:
         sine, cosine = sincos(code, code.load("cycle", layout.cycle), "e")
         self.sine, self.cosine = [sine], [cosine]
         self.line = [code.load(name, getattr(layout, name)) for name in ("level", "slope")] if layout.tabled else []
+        self.factor = [code.load(name, getattr(layout, name)) for name in RAMPED_LOAD] if layout.ramped else []
         self.falling: list[Term] = []
+        self.whole: list[Term] = []
         self.series: list[Term] = []
 
     def extend(self, k: int) -> None:
@@ -264,7 +326,19 @@ class _Curve:
         if self.line:
             level, slope = self.line
             value += f" + {slope}*{self.shaft[k]}" + (f" + {level}" if k == 0 else "")
+        if self.factor:
+            value = self._ramped(value, k)
         self.series.append(code.let(f"B{k}", value))
+
+    def _ramped(self, value: str, k: int) -> str:
+        """Coefficient k of B where the load has a factor, from that without one."""
+        code = self.code
+        factor, generator, quadratic, change = self.factor
+        against = resistance(generator, quadratic, self.shaft[k], code.let("V", square(self.shaft, k)))
+        polynomial = code.let("polynomial", against + (Term("load") if k == 0 else Term("0.0")))
+        self.whole.append(code.let("whole", f"{value} + {polynomial}"))
+        value = f"{factor}*{self.whole[k]} - {polynomial}"
+        return value if k == 0 else f"{value} + {change}*{self.whole[k - 1]}"
 
 
 def _watched(code: LaneCode, step: Term, bent: _Curve, shaft: list[Term], order: int) -> str:

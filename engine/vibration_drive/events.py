@@ -34,12 +34,12 @@ from sprag_study.engine.vibration_drive.states import (
     SLOWER,
     START,
     TAKE_UP,
+    held_excess,
     is_held,
     set_clutch,
     set_piece,
     set_shaft,
     stored_energy,
-    total,
     watch_fall,
 )  # fmt: skip
 
@@ -144,7 +144,7 @@ def collect_guards(W: Floats, Z: Ints, lay: Layout, lane: int, g: Floats, blocks
     if not (idle or W[lay.m_sum_high if shaft == HELD else lay.m_speed_low, lane] > 0.0):
         slower = lay.tabled == 1 and shaft == ROTATING and W[lay.speed_low, lane] > 0.0
         if shaft == HELD:
-            total(W, lay, lane, g)
+            held_excess(W, lay, lane, g)
             for k in range(lay.order + 1):
                 g[k] = -g[k]
             g[0] += W[lay.sum_high, lane]

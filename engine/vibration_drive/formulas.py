@@ -41,6 +41,32 @@ def harmonic_series(
     return x, y
 
 
+def ramped_series(
+    x_cos: _Value,
+    x_sin: _Value,
+    y_cos: _Value,
+    y_sin: _Value,
+    motion: tuple[_Value, _Value],
+    sin: _Value,
+    cos: _Value,
+) -> tuple[_Pair[_Value], _Pair[_Value]]:
+    """First two coefficients of the acceleration of the base in x and y by a part of its motion whose angle theta is
+    ramped.
+
+    The displacement is ``x_cos cos theta + x_sin sin theta`` in m, and likewise in y. ``motion`` holds theta' in rad/s
+    and the constant theta'' in rad/s^2, ``sin`` and ``cos`` are those of theta.
+    """
+    rate, slope = motion
+    square = rate * rate
+    third, cube = slope * rate * 3.0, square * rate
+    x, y = x_cos * cos + x_sin * sin, y_cos * cos + y_sin * sin
+    turned_x, turned_y = x_sin * cos - x_cos * sin, y_sin * cos - y_cos * sin
+    return (
+        (slope * turned_x - square * x, -(third * x + cube * turned_x)),
+        (slope * turned_y - square * y, -(third * y + cube * turned_y)),
+    )
+
+
 def drive(x: Sequence[_Value], y: Sequence[_Value], sin: Sequence[_Value], cos: Sequence[_Value], k: int) -> _Value:
     """Coefficient k of the base's drive x'' cos phi + y'' sin phi in m/s^2, from the series of its factors."""
     if k == 0:

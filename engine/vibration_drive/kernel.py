@@ -1,6 +1,6 @@
 """The generated kernel: straight-line code for one shape of machine, stored with its machine code in a per-user cache.
 
-One module per (pendulums, clutch coefficients, terms of the load, harmonics of the base, order, lanes).
+One module per (pendulums, clutch coefficients, terms of the load, ramps, harmonics of the base, order, lanes).
 """
 
 import importlib.util
@@ -219,20 +219,31 @@ def kernel(
     drag: bool = False,
     curved: bool = False,
     tabled: bool = False,
+    ramped: bool = False,
     harmonics: int = 0,
 ) -> Kernel:
     """The kernel of one shape, generated or loaded from the cache.
 
     ``drag``: with torques that depend on speeds; ``curved``: with loads that are no polynomials of the speed, too;
-    ``tabled``: with a load that is a table over it besides; ``harmonics``: with as many harmonics of the base.
+    ``tabled``: with a load that is a table over it besides; ``ramped``: with an excitation and a load that change
+    linearly in time, and with loads of these kinds; ``harmonics``: with as many harmonics of the base.
     """
     terms = "_tabled" if tabled else "_curved" if curved else "_drag" if drag else ""
+    terms += "_ramped" if ramped else ""
     terms += f"_h{harmonics}" if harmonics else ""
     name = f"drive_n{pendulums}_c{coefficients}_p{order}_l{lanes}{terms}"
     path = cache_folder() / f"{name}.py"
     if not path.exists():
         layout = make_layout(
-            pendulums, coefficients, order, lanes, drag=drag, curved=curved, tabled=tabled, harmonics=harmonics
+            pendulums,
+            coefficients,
+            order,
+            lanes,
+            drag=drag,
+            curved=curved,
+            tabled=tabled,
+            ramped=ramped,
+            harmonics=harmonics,
         )
         _write(path, source(layout))
     spec = importlib.util.spec_from_file_location(f"sprag_kernels.{name}", path)
@@ -244,8 +255,8 @@ def kernel(
     return cast(Kernel, module)
 
 
-def kernel_of(columns: Mapping[str, ArrayLike], tolerance: float) -> Kernel:
-    """The kernel for cases of a batch, on this machine's lanes.
+def kernel_of(columns: Mapping[str, ArrayLike], tolerance: float, *, ramped: bool = False) -> Kernel:
+    """The kernel for cases of a batch, on this machine's lanes; ``ramped``: whose excitation or load is ramped.
 
     Raises
     ------
@@ -254,8 +265,8 @@ def kernel_of(columns: Mapping[str, ArrayLike], tolerance: float) -> Kernel:
     """
     shape = pendulum_count(columns), coefficient_count(columns), order_for(tolerance), lane_count()
     tabled = has_table(columns)
-    curved = tabled or has_curve(columns)
+    curved = ramped or tabled or has_curve(columns)
     drag, harmonics = curved or has_drag(columns), harmonic_room(columns)
-    terms = {"drag": drag, "curved": curved, "tabled": tabled, "harmonics": harmonics}
+    terms = {"drag": drag, "curved": curved, "tabled": tabled, "ramped": ramped, "harmonics": harmonics}
     # What is not there is left out, so that a kernel is the one of its shape alone.
     return kernel(*shape, **{name: value for name, value in terms.items() if value})

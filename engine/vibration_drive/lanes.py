@@ -63,6 +63,7 @@ _STRIBECK, _STRIBECK_RATE = int(Column.STRIBECK), int(Column.STRIBECK_RATE)
 _CYCLIC, _CYCLES, _CYCLE = int(Column.CYCLIC), int(Column.CYCLES), int(Column.CYCLE)
 _INVERSE_RATE, _SPEED, _MOST_STEPS = int(Column.INVERSE_RATE), int(Column.SPEED), int(Column.MOST_STEPS)
 _TABLE_SPEEDS, _TABLE_TORQUES = int(TABLE_SPEEDS.start), int(TABLE_TORQUES.start)
+_PHASE = int(Column.PHASE)
 _FIRST_PENDULUM = stop_column(STOPS)
 _P_COPIED = int(PendulumColumn.OVERRUNNING_DAMPING) + 1
 _P_ANGLE, _P_SPEED = int(PendulumColumn.ANGLE), int(PendulumColumn.SPEED)
@@ -98,6 +99,9 @@ def _load_shaft(W: Floats, lay: Layout, lane: int, row: Floats) -> None:
     W[lay.cyclic, lane] = row[_CYCLIC]
     W[lay.cycles, lane] = row[_CYCLES]
     W[lay.cycle, lane] = row[_CYCLE]
+    if lay.ramped == 1:
+        for k in range(lay.held_load - lay.phase):
+            W[lay.phase + k, lane] = row[_PHASE + k]
     if lay.tabled == 1:
         for k in range(MAX_LOAD_ROWS):
             W[lay.table_speed + k, lane] = row[_TABLE_SPEEDS + k]

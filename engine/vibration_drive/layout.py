@@ -42,6 +42,10 @@ def pendulum_samples(i: int) -> slice:
     return slice(first, first + len(PendulumSample))
 
 
+#: Rows of a lane whose excitation, or load, changes linearly in time; first those that a case gives, in their order.
+RAMP = ("phase", "phase_rate", "phase_slope", "load_factor", "load_slope", "held_load")
+
+
 class Layout(NamedTuple):
     """Sizes and row numbers. Compiled code gets them by ``as_record``."""
 
@@ -53,6 +57,8 @@ class Layout(NamedTuple):
     curved: int
     # whether the load has a table over the speed (`parameters.LOAD_TABLE`): 0 or 1, with curved only
     tabled: int
+    # whether excitation or load change linearly in time (docs/theory.md, "Start-up"): 0 or 1, with curved only
+    ramped: int
     # harmonics of the base vibration that the kernel has room for
     harmonics: int
     order: int
@@ -94,6 +100,14 @@ class Layout(NamedTuple):
     stribeck_rate: int
     cyclic: int
     cycles: int
+    # where `ramped` says so: the phase of the excitation in turns, its angular frequency and the rate of that; the
+    # factor on the load and the rate of that; the load without its factor that holds a shaft, 0 where the shaft rotates
+    phase: int
+    phase_rate: int
+    phase_slope: int
+    load_factor: int
+    load_slope: int
+    held_load: int
     # rows of the table of the load: MAX_LOAD_ROWS speeds and torques each, where `tabled` says so
     table_speed: int
     table_torque: int
@@ -268,6 +282,7 @@ _beside(
     f"p_x_{_EXTREMA.format('p_x_')}",
     _SHAFT_EXTREMA.format(""),
     f"x_{_SHAFT_EXTREMA.format('x_')}",
+    "phase phase_rate phase_slope load_factor load_slope",
     "sum_high speed_low speed_high",
     "m_sum_high m_speed_low m_speed_high",
 )
@@ -282,15 +297,19 @@ def make_layout(
     drag: bool = False,
     curved: bool = False,
     tabled: bool = False,
+    ramped: bool = False,
     harmonics: int = 0,
 ) -> Layout:
     """Lay out the rows for ``n`` pendulums, that many clutch coefficients, series of that order, and that many lanes.
 
     ``drag``: for torques that depend on speeds too; ``curved``: for a load that is no polynomial of the speed besides;
-    ``tabled``: for one that is a table over it, and for all of these; ``harmonics``: with room for as many of the base.
+    ``tabled``: for one that is a table over it, and for all of these; ``ramped``: for an excitation and a load that
+    change linearly in time, and for all but the table; ``harmonics``: with room for as many of the base.
     """
+    curved = curved or tabled or ramped
     sizes = dict.fromkeys(("speed", "p_speed", "p_torque"), order + 1)
-    sizes["curve"] = order + 1 if curved or tabled else 1
+    sizes["curve"] = order + 1 if curved else 1
+    sizes |= dict.fromkeys(RAMP, int(ramped))
     sizes |= dict.fromkeys(("table_speed", "table_torque"), MAX_LOAD_ROWS if tabled else 1)
     sizes |= dict.fromkeys((name for name in Layout._fields if name.startswith("harmonic_")), harmonics)
     sizes |= {"p_drive": order, "p_law": coefficients, "p_force": coefficients}
@@ -304,7 +323,7 @@ def make_layout(
         else:
             fields[name] = shaft_rows
             shaft_rows += sizes.get(name, 1)
-    terms = int(drag or curved or tabled), int(curved or tabled), int(tabled)
+    terms = int(drag or curved), int(curved), int(tabled), int(ramped)
     return Layout(
         n, coefficients, *terms, harmonics, order, lanes, shaft_rows + n * stride, shaft_rows, stride, **fields
     )

@@ -19,6 +19,7 @@ from sprag_study.engine.vibration_drive.formulas import (
     drive,
     free_acceleration,
     harmonic_series,
+    ramped_series,
     resistance,
 )
 from sprag_study.engine.vibration_drive.layout import Layout
@@ -60,6 +61,42 @@ _T_LOW, _T_HIGH = int(Band.T_LOW), int(Band.T_HIGH)
 
 _base_series, _drive, _free_acceleration = inlined(base_series), inlined(drive), inlined(free_acceleration)
 _resistance, _harmonic_series = inlined(resistance), inlined(harmonic_series)
+_ramped_series = inlined(ramped_series)
+
+
+@part
+def _ramped_base(W: Floats, lay: Layout, lane: int) -> tuple[tuple[float, float], tuple[float, float]]:
+    """First two coefficients of the accelerations in x and y of a base whose frequency changes."""
+    rate, slope = W[lay.phase_rate, lane], W[lay.phase_slope, lane]
+    theta = 2.0 * math.pi * W[lay.phase, lane]
+    per = 1.0 / (W[lay.nu, lane] * W[lay.nu, lane])
+    b = W[lay.acc_y, lane] * per
+    x, y = _ramped_series(
+        W[lay.acc_x, lane] * per,
+        0.0,
+        b * W[lay.sin_chi, lane],
+        b * W[lay.cos_chi, lane],
+        (rate, slope),
+        sine(theta),
+        cosine(theta),
+    )
+    for j in range(lay.harmonics):
+        order = W[lay.harmonic_order + j, lane]
+        turns = order * W[lay.phase, lane]
+        theta = 2.0 * math.pi * (turns - math.floor(turns))
+        square = -per / max(order * order, 1.0)  # of no harmonic the order is 0
+        further_x, further_y = _ramped_series(
+            W[lay.harmonic_x_cos + j, lane] * square,
+            W[lay.harmonic_x_sin + j, lane] * square,
+            W[lay.harmonic_y_cos + j, lane] * square,
+            W[lay.harmonic_y_sin + j, lane] * square,
+            (order * rate, order * slope),
+            sine(theta),
+            cosine(theta),
+        )
+        x = (x[0] + further_x[0], x[1] + further_x[1])
+        y = (y[0] + further_y[0], y[1] + further_y[1])
+    return x, y
 
 
 @part
@@ -93,6 +130,8 @@ def _coefficient(W: Floats, lay: Layout, lane: int, i: int, k: int, rate: float)
         )
         x = (x[0] + further_x[0], x[1] + further_x[1])
         y = (y[0] + further_y[0], y[1] + further_y[1])
+    if lay.ramped == 1:
+        x, y = _ramped_base(W, lay, lane)
     phi = (W[base + lay.p_phi, lane], W[base + lay.p_speed, lane])
     w = (phi[1], rate)
     s, c = sine(phi[0]), cosine(phi[0])
@@ -242,6 +281,29 @@ def _falling(W: Floats, lay: Layout, lane: int) -> float:
 
 
 @part
+def _load_torque(W: Floats, lay: Layout, lane: int) -> float:
+    """Torque of the load in N*m that has a factor which changes, without that factor."""
+    speed = W[lay.speed, lane]
+    torque = W[lay.load, lane] + _resistance(W[lay.generator, lane], W[lay.quadratic, lane], speed, speed * speed)
+    torque += _falling(W, lay, lane) + W[lay.cyclic, lane] * cosine(W[lay.cycle, lane])
+    if lay.tabled == 1:
+        torque += W[lay.level, lane] + W[lay.slope, lane] * speed
+    return float(torque)
+
+
+@part
+def _load_rate(W: Floats, lay: Layout, lane: int, rate: float) -> float:
+    """Rate of ``_load_torque`` in N*m/s, where the shaft's acceleration is ``rate``."""
+    speed = W[lay.speed, lane]
+    change = _resistance(W[lay.generator, lane], W[lay.quadratic, lane], rate, 2.0 * speed * rate)
+    change -= W[lay.stribeck_rate, lane] * rate * _falling(W, lay, lane)
+    change -= W[lay.cyclic, lane] * W[lay.cycles, lane] * speed * sine(W[lay.cycle, lane])
+    if lay.tabled == 1:
+        change += W[lay.slope, lane] * rate
+    return float(change)
+
+
+@part
 def _shared_acceleration(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, size: float) -> float:
     """Acceleration of the shaft that is consistent with all clutches that meet clutch ``i``; notes each one's lock
     torque and the width of its edges.
@@ -257,6 +319,8 @@ def _shared_acceleration(W: Floats, Z: Ints, lay: Layout, lane: int, i: int, siz
         push -= _falling(W, lay, lane) + W[lay.cyclic, lane] * cosine(W[lay.cycle, lane])
     if lay.tabled == 1:
         push -= W[lay.level, lane] + W[lay.slope, lane] * W[lay.speed, lane]
+    if lay.ramped == 1:
+        push += (1.0 - W[lay.load_factor, lane]) * _load_torque(W, lay, lane)
     for j in range(lay.n):
         base = lay.pendulums + j * lay.stride
         notes = base + lay.p_m_w_low
@@ -295,6 +359,9 @@ def _shared_jerk(W: Floats, Z: Ints, lay: Layout, lane: int, rate: float) -> Non
         push += W[lay.cyclic, lane] * swing * sine(W[lay.cycle, lane])
     if lay.tabled == 1:
         push -= W[lay.slope, lane] * rate
+    if lay.ramped == 1:
+        push += (1.0 - W[lay.load_factor, lane]) * _load_rate(W, lay, lane, rate)
+        push -= W[lay.load_slope, lane] * _load_torque(W, lay, lane)
     for j in range(lay.n):
         base = lay.pendulums + j * lay.stride
         notes = base + lay.p_m_w_low

@@ -130,7 +130,15 @@ def trajectory(columns: Mapping[str, ArrayLike], run: Run, times: ArrayLike, sta
     return sampled(values, matrix, found, asked)
 
 
-def sampled(values: Mapping[str, float], matrix: Floats, found: Integration, times: Floats) -> Trajectory:
+def sampled(
+    values: Mapping[str, float],
+    matrix: Floats,
+    found: Integration,
+    times: Floats,
+    *,
+    angle: Floats | None = None,
+    load_factor: Floats | float = 1.0,
+) -> Trajectory:
     """The instantaneous values that a call of the kernel has left of one case, by name.
 
     Parameters
@@ -143,6 +151,9 @@ def sampled(values: Mapping[str, float], matrix: Floats, found: Integration, tim
         Of a call that was asked for samples.
     times : array, shape (m,)
         The same times in s, from the start of an excitation period.
+    angle, load_factor : array, shape (times that were reached,), optional
+        Of a start-up the phase of the excitation in rad and the factor on the load at the times; without them the phase
+        follows from the times.
     """
     n, done = pendulum_count(values), found.recorded
     frequency = values["excitation.frequency"]
@@ -151,13 +162,13 @@ def sampled(values: Mapping[str, float], matrix: Floats, found: Integration, tim
     defaults = {parameter.path: parameter.default for parameter in PARAMETERS}
     value = {**{k: v for k, v in defaults.items() if v is not None}, **values}
     nu = 2.0 * math.pi * frequency
+    phase = nu * times_done if angle is None else angle
     out = {
-        "base.displacement_x": value["excitation.amplitude_x"] * elementary.cos(nu * times_done),
-        "base.displacement_y": value["excitation.amplitude_y"]
-        * elementary.sin(nu * times_done + value["excitation.phase"]),
+        "base.displacement_x": value["excitation.amplitude_x"] * elementary.cos(phase),
+        "base.displacement_y": value["excitation.amplitude_y"] * elementary.sin(phase + value["excitation.phase"]),
     }
     for harmonic in harmonics(values, 1):
-        turned = harmonic.order * nu * times_done
+        turned = harmonic.order * nu * times_done if angle is None else harmonic.order * angle
         for axis, part in (
             ("x", harmonic.amplitude_x * elementary.cos(turned + harmonic.phase_x)),
             ("y", harmonic.amplitude_y * elementary.sin(turned + harmonic.phase_y)),
@@ -169,7 +180,8 @@ def sampled(values: Mapping[str, float], matrix: Floats, found: Integration, tim
     if not unloaded(matrix, n)[0]:
         # As for the minimum in ``characteristics``: only rounding errors can turn back a resisted shaft.
         out["shaft.speed"] = np.maximum(out["shaft.speed"], 0.0)
-    out["power.useful"] = _load_torque(value, out["shaft.speed"], out["shaft.angle"]) * out["shaft.speed"]
+    load = _load_torque(value, out["shaft.speed"], out["shaft.angle"])
+    out["power.useful"] = load * out["shaft.speed"] * load_factor
     out["power.clutch"] = out["torque"] * out["shaft.speed"]
     clutch_losses: list[Floats] = []
     for i in range(n):
@@ -232,6 +244,7 @@ def warm_up(
     curved: bool = False,
     tabled: bool = False,
     harmonics: int = 0,
+    ramped: bool = False,
 ) -> None:
     """Generate and compile the kernel of a shape, and what settles motions, so that others load them from the cache."""
     from sprag_study.engine.vibration_drive.settle import settle
@@ -244,6 +257,11 @@ def warm_up(
     columns |= {"shaft.stribeck_load": 1.0} if curved else {}
     columns |= {f"{LOAD_TABLE}0.speed": 0.0, f"{LOAD_TABLE}0.torque": 1.0} if tabled else {}
     columns |= {f"{HARMONICS}{k}.order": 2.0 for k in range(harmonics)}
+    if ramped:
+        from sprag_study.engine.vibration_drive.start_up import ramp_answers
+
+        ramp_answers(columns, tolerance)
+        return
     # Nothing moves, which is periodic: this runs all steps of the search, down to the means.
     settle(columns, SettledRun(tolerance=tolerance), cases=1)
     simulate(columns, Run(tolerance=tolerance), cases=1)

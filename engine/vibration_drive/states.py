@@ -93,6 +93,15 @@ def total(W: Floats, lay: Layout, lane: int, g: Floats) -> None:
             g[k] += W[first + k, lane]
 
 
+@inlined
+def held_excess(W: Floats, lay: Layout, lane: int, g: Floats) -> None:
+    """Like ``total``, less the changing load that holds the shaft."""
+    total(W, lay, lane, g)
+    if lay.ramped == 1:
+        g[0] -= W[lay.load_factor, lane] * W[lay.held_load, lane]
+        g[1] -= W[lay.load_slope, lane] * W[lay.held_load, lane] * W[lay.h, lane]
+
+
 @part
 def stored_energy(W: Floats, lay: Layout, lane: int, i: int, u: float) -> float:
     """Energy Pi(u) in the clutch of pendulum ``i`` at windup ``u >= 0``, including the linear part beyond the data."""
@@ -177,7 +186,7 @@ def count_event(W: Floats, Z: Ints, lay: Layout, lane: int) -> None:
 
 @part
 def load_at_rest(W: Floats, lay: Layout, lane: int) -> float:
-    """Torque in N*m up to which the load holds a shaft that stands."""
+    """Torque in N*m up to which the load, without a factor that changes, holds a shaft that stands."""
     load = W[lay.load, lane]
     if lay.curved == 1:
         load += W[lay.stribeck, lane] + W[lay.cyclic, lane] * cosine(W[lay.cycle, lane])
@@ -188,7 +197,10 @@ def load_at_rest(W: Floats, lay: Layout, lane: int) -> float:
 
 @part
 def is_held(W: Floats, lay: Layout, lane: int) -> bool:
-    """Whether the shaft is held when it stands: without a load and a backstop nothing does."""
+    """Whether the shaft is held when it stands: without a load and a backstop nothing does.
+
+    A load that begins at nothing holds the shaft until a clutch pushes.
+    """
     dry = W[lay.load, lane]
     if lay.curved == 1:
         dry += W[lay.stribeck, lane]
@@ -230,6 +242,10 @@ def set_shaft(W: Floats, Z: Ints, lay: Layout, lane: int, state: int) -> None:
     Z[lane, SHAFT_STATE] = state
     W[lay.rotating, lane] = 1.0 if state == ROTATING else 0.0
     W[lay.sum_high, lane] = load if state == HELD else NEVER
+    if lay.ramped == 1:
+        # Of a load that changes the guard itself has the load (`held_excess`).
+        W[lay.held_load, lane] = load if state == HELD else 0.0
+        W[lay.sum_high, lane] = 0.0 if state == HELD else NEVER
     # Torques that depend on speeds vanish at rest: without a dry load and a backstop a shaft stops only in the limit.
     W[lay.speed_low, lane] = 0.0 if state == ROTATING and is_held(W, lay, lane) else -NEVER
     if lay.tabled == 1:

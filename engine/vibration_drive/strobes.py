@@ -90,9 +90,9 @@ def in_order(recorded: Floats, periods: Ints) -> Floats:
 @part
 def begin_at(W: Floats, Z: Ints, lay: Layout, lane: int, start: Floats) -> None:
     """Put a lane, whose case has just been loaded, into the state of a strobe."""
+    W[lay.f, lane] = start[BEGIN]
     if start[SHAFT] == NOT_GIVEN:
         return
-    W[lay.f, lane] = start[BEGIN]
     W[lay.speed, lane] = start[SHAFT_SPEED]
     for i in range(lay.n):
         base = lay.pendulums + i * lay.stride

@@ -48,7 +48,7 @@ _VIEWER: Final = (
     f"GET {_CASE}",
     *(f"GET {_CASE}/{part}" for part in (
         "trajectory", "branch", "diagram", "section", "engagements", "duty", "forces", "strobes", "speeds", "transient",
-        "basin",
+        "basin", "startup",
     )),
     "GET /api/v1/night",
     "GET /api/v1/schedules", "GET /api/v1/schedules/{schedule_id}",

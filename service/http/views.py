@@ -23,7 +23,7 @@ from sprag_study.service.spec.document import format_of, load_spec
 from sprag_study.service.storage.studies.records import CaseRow
 from sprag_study.worker import models
 from sprag_study.worker.codes import PENDING
-from sprag_study.worker.models.abilities import has_reactions, has_speeds, has_transients
+from sprag_study.worker.models.abilities import has_reactions, has_speeds, has_start_ups, has_transients
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -131,6 +131,8 @@ def case_detail(store: Store, study_id: str, study: Study, case: int) -> CaseDet
         links |= {name: f"{own}/{name}" for name in ("engagements", "duty")}
     if has_reactions(study):
         links["forces"] = f"{own}/forces"
+    if has_start_ups(study):
+        links["startup"] = f"{own}/startup"
     if models.has_strobes(study):
         links["strobes"] = f"{own}/strobes"
         links |= {name: f"{own}/{name}" for name in ("branch", "diagram", "section")}

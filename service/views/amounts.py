@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import NamedTuple
 
 from sprag_study.sentences import Amount, Sentence, Typed
 from sprag_study.service.faults import parameter_error
 from sprag_study.service.reading.numbers import in_language
-from sprag_study.service.reading.units import QuantityError, typed_value
+from sprag_study.service.reading.units import PERIOD_NAMES, QuantityError, split_quantity, to_float, typed_value
 
 
 class Range(NamedTuple):
@@ -33,3 +34,12 @@ def amount_of(name: str, text: str, allowed: Range) -> float:
         span = Sentence("above {low} to {high}", **ends) if above else Sentence("{low} to {high}", **ends)
         raise parameter_error(name, "out-of-range", "is outside its range", text, span)
     return value
+
+
+def time_of(name: str, text: str, allowed: Range, period: float) -> float:
+    """Like `amount_of`, of a time in s that may be given in periods, of that many seconds, too."""
+    with suppress(QuantityError):
+        number, unit = split_quantity(in_language(text))
+        if unit in PERIOD_NAMES:
+            return amount_of(name, repr(to_float(number) * period), allowed)
+    return amount_of(name, text, allowed)

@@ -377,6 +377,58 @@ class TransientQuestion:
     ] = 1000
 
 
+@dataclass(frozen=True, slots=True)
+class StartUpQuestion:
+    """Which ramps, and what counts as settled."""
+
+    ramp: Annotated[
+        str | None,
+        Setting(
+            "time in which the excitation frequency rises linearly to its value, in s or with a unit (s, periods of "
+            "the final frequency); by default 0",
+            examples=("0.5 s",),
+            metavar="TIME",
+            label=N_("Ramp of the frequency"),
+        ),
+    ] = None
+    start_frequency: Annotated[
+        str | None,
+        Setting(
+            "frequency at which that ramp begins, Hz or with a unit; by default 0",
+            examples=("5 Hz",),
+            metavar="FREQUENCY",
+            label=N_("Frequency at the start"),
+        ),
+    ] = None
+    load_ramp: Annotated[
+        str | None,
+        Setting(
+            "time in which the load of the shaft rises linearly from nothing, with the same units; by default 0",
+            metavar="TIME",
+            label=N_("Ramp of the load"),
+        ),
+    ] = None
+    within: Annotated[
+        str | None,
+        Setting(
+            "share by which a mean speed may differ from the settled one; by default 0.02",
+            examples=("5 %",),
+            metavar="SHARE",
+            label=N_("Counts as settled within"),
+        ),
+    ] = None
+    points: Annotated[
+        int,
+        Setting(
+            "equally spaced times",
+            examples=(50,),
+            low=MIN_TRAJECTORY_POINTS,
+            high=MAX_TRAJECTORY_POINTS,
+            metavar="N",
+        ),
+    ] = 1000
+
+
 TRAJECTORY: Final = ViewInfo(
     "trajectory",
     TrajectoryQuestion,
@@ -470,6 +522,16 @@ BASIN: Final = ViewInfo(
         "these starts, its mean speed and its order. The case is run from every start for this."
     ),
 )
+START_UP: Final = ViewInfo(
+    "startup",
+    StartUpQuestion,
+    "Compute the start-up of one case with ramps of the excitation frequency and of the load: time, energy, torques.",
+    title=N_("Start-up: how long until the shaft runs at its settled speed"),
+    note=N_(
+        "From the start of this case, while the excitation frequency and the load rise to their values. The dashed "
+        "line is the mean speed of the motion to which the drive comes."
+    ),
+)
 SPEEDS: Final = ViewInfo(
     "speeds",
     SpeedsQuestion,
@@ -496,4 +558,6 @@ TRANSIENT: Final = ViewInfo(
     ),
 )
 #: Every view of a case, in the order of the API.
-CASE_VIEWS: Final = (TRAJECTORY, ENGAGEMENTS, DUTY, FORCES, STROBES, BRANCH, DIAGRAM, SECTION, BASIN, SPEEDS, TRANSIENT)
+CASE_VIEWS: Final = (
+    TRAJECTORY, ENGAGEMENTS, DUTY, FORCES, STROBES, BRANCH, DIAGRAM, SECTION, BASIN, START_UP, SPEEDS, TRANSIENT,
+)  # fmt: skip

@@ -13,6 +13,7 @@ from sprag_study.service.views.forces import ForcesView
 from sprag_study.service.views.portrait import StrobesView
 from sprag_study.service.views.sections import DiagramView, SectionView
 from sprag_study.service.views.speeds import SpeedsView
+from sprag_study.service.views.start_up import StartUpView
 from sprag_study.service.views.trajectory import TrajectoryView
 from sprag_study.service.views.transient import TransientView
 
@@ -22,6 +23,6 @@ CASE_VIEWS: Final[dict[str, CaseView[Any, Any, Any]]] = {
     for view in (
         TrajectoryView(), EngagementsView(), DutyView(), ForcesView(), StrobesView(), BranchView(), DiagramView(),
         SectionView(),
-        BasinView(), SpeedsView(), TransientView(),
+        BasinView(), StartUpView(), SpeedsView(), TransientView(),
     )
 }  # fmt: skip

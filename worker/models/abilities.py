@@ -1,4 +1,5 @@
-"""What only some models can do, each an object of its model, or None: clutches, reactions, strobes, transients.
+"""What only some models can do, each an object of its model, or None: clutches, reactions, strobes and
+so on.
 
 Every function is a module's own, so that another process can run it.
 """
@@ -19,7 +20,8 @@ if TYPE_CHECKING:
     from sprag_study.worker.models.branches import Along, CaseBranch
     from sprag_study.worker.models.common import KernelShape
     from sprag_study.worker.models.forces import Bearing, Forces
-    from sprag_study.worker.models.model import Strobes, Transients
+    from sprag_study.worker.models.model import StartUps, Strobes, Transients
+    from sprag_study.worker.models.ramps import Ramps, StartUp
     from sprag_study.worker.models.sections import CaseSections, Sampling
     from sprag_study.worker.models.turns import CaseTurn
     from sprag_study.worker.study import Study
@@ -37,6 +39,11 @@ def has_clutches(study: Study) -> bool:
 def has_reactions(study: Study) -> bool:
     """Whether the machine of ``study`` acts on a vibrating table."""
     return model_of(study.model).reactions is not None
+
+
+def has_start_ups(study: Study) -> bool:
+    """Whether the cases of ``study`` start up with ramps of their excitation and load."""
+    return model_of(study.model).start_ups is not None
 
 
 def has_strobes(study: Study) -> bool:
@@ -137,6 +144,16 @@ def run_transient(study: Study, case: int, course: Course, points: int) -> Trans
     return _transients(study).run(study, case, course, points)
 
 
+def shape_of_start_ups(study: Study) -> KernelShape:
+    """The kernel of ramps, which is compiled apart from that of the cases; ValueError where there are none."""
+    return _start_ups(study).shape(study)
+
+
+def run_start_up(study: Study, case: int, ramps: Ramps, points: int) -> StartUp:
+    """The start-up of one case, with ``points`` equally spaced times; ValueError where its model has none."""
+    return _start_ups(study).run(study, case, ramps, points)
+
+
 def run_speeds(study: Study, case: int, load: float) -> SteadyCycles:
     """Every steady cycle of one case with a factor on its load; ValueError where no torque follows the speed."""
     return _of(study, model_of(study.model).speeds, "torques that follow the speed").run(study, case, load)
@@ -144,6 +161,10 @@ def run_speeds(study: Study, case: int, load: float) -> SteadyCycles:
 
 def _strobes(study: Study) -> Strobes:
     return _of(study, model_of(study.model).strobes, "strobes")
+
+
+def _start_ups(study: Study) -> StartUps:
+    return _of(study, model_of(study.model).start_ups, "start-ups")
 
 
 def _transients(study: Study) -> Transients:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from sprag_study.worker.models.branches import Along, CaseBranch
     from sprag_study.worker.models.common import ChunkResult, ChunkTask, Extent, KernelShape
     from sprag_study.worker.models.forces import Bearing, Forces
+    from sprag_study.worker.models.ramps import Ramps, StartUp
     from sprag_study.worker.models.sections import CaseSections, Sampling
     from sprag_study.worker.models.turns import CaseTurn
     from sprag_study.worker.study import Study
@@ -81,6 +82,18 @@ class Strobes(Protocol):
 
     def end_state(self, study: Study, case: int) -> dict[str, float] | None:
         """Initial values (SI) by path that go on from the end of one case; None where it does not end ok."""
+        ...
+
+
+class StartUps(Protocol):
+    """The cases of a model start up with ramps of their excitation and load."""
+
+    def shape(self, study: Study) -> KernelShape:
+        """The kernel of ramps, which is compiled apart from that of the cases."""
+        ...
+
+    def run(self, study: Study, case: int, ramps: Ramps, points: int) -> StartUp:
+        """The start-up of a case with ``points`` equally spaced times."""
         ...
 
 
@@ -236,6 +249,11 @@ class Model(Protocol):
     @property
     def strobes(self) -> Strobes | None:
         """The strobes and initial values of its cases; None where they have none."""
+        return None
+
+    @property
+    def start_ups(self) -> StartUps | None:
+        """The start-ups of its cases; None where they have none."""
         return None
 
     @property

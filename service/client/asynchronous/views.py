@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from sprag_study.service.answers.results import BasinData, Branch, Map, Portrait, SensitivityReport
     from sprag_study.service.answers.sections import Sections
     from sprag_study.service.answers.speeds import SteadySpeeds
+    from sprag_study.service.answers.start_ups import StartUp
     from sprag_study.service.answers.transients import Transient
     from sprag_study.service.client.queries import Ends, Held, Value
 
@@ -444,6 +445,46 @@ class AsyncStudyViews(AsyncStudyPart):
             }
         )
         return cast("BasinData", await self._of_case(case, "/basin", query))
+
+    async def startup(
+        self,
+        case: int,
+        *,
+        ramp: Value | None = None,
+        start_frequency: str | None = None,
+        load_ramp: Value | None = None,
+        within: Value | None = None,
+        points: int | None = None,
+        start: int | None = None,
+    ) -> StartUp:
+        """Compute the start-up of one case with ramps of the excitation frequency and of the load: time, energy,
+        torques.
+
+        Parameters
+        ----------
+        ramp : float or str, optional
+            Time in which the excitation frequency rises linearly to its value, in s or with a unit (s, periods of the
+            final frequency); by default 0.
+        start_frequency : str, optional
+            Frequency at which that ramp begins, Hz or with a unit; by default 0.
+        load_ramp : float or str, optional
+            Time in which the load of the shaft rises linearly from nothing, with the same units; by default 0.
+        within : float or str, optional
+            Share by which a mean speed may differ from the settled one; by default 0.02.
+        points : int, optional
+            Equally spaced times.
+        """
+        query = query_of(
+            {
+                "ramp": ramp,
+                "start_frequency": start_frequency,
+                "load_ramp": load_ramp,
+                "within": within,
+                "points": points,
+                "start": start,
+            }
+        )
+        return cast("StartUp", await self._of_case(case, "/startup", query))
 
     async def speeds(self, case: int, *, load: Value | None = None) -> SteadySpeeds:
         """Compute every steady cycle of a machine shaft: its speed, its multiplier, and from which speeds the shaft

@@ -72,7 +72,7 @@ _PHASES: Final = "phases"
 PARTS: Final[dict[str, CaseView[Any, Any, Any]]] = {
     **{name: CASE_VIEWS[name] for name in ("engagements", "duty", "forces", "strobes", "section")},
     _PHASES: PhasesView(),
-    **{name: CASE_VIEWS[name] for name in ("branch", "diagram", "basin", "speeds", "transient")},
+    **{name: CASE_VIEWS[name] for name in ("startup", "branch", "diagram", "basin", "speeds", "transient")},
 }
 #: The ending of a machine that has no motion of the required mean speed, for which no spec of it alone is valid.
 _NO_MOTION: Final = "inertia_insufficient"

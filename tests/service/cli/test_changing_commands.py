@@ -56,6 +56,7 @@ OTHERS = {
             "section",
             "settled",
             "speeds",
+            "startup",
             "strobes",
             "trajectory",
             "transient",

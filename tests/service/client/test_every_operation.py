@@ -73,6 +73,7 @@ OPERATIONS: dict[str, tuple[Call, str]] = {
     "get_engagements": (lambda _, s: s.engagements(3), "show ID engagements --case 3"),
     "get_duty": (lambda _, s: s.duty(3, exponent=5), "show ID duty --case 3"),
     "get_forces": (lambda _, s: s.forces(3), "show ID forces --case 3"),
+    "get_startup": (lambda _, s: s.startup(3, ramp="1 s"), "show ID startup --case 3"),
     "get_strobes": (lambda _, s: s.strobes(3), "show ID strobes --case 3"),
     "get_speeds": (lambda _, s: s.speeds(3), "show ID speeds --case 3"),
     "get_transient": (lambda _, s: s.transient(3, "run-up"), "show ID transient --case 3 --kind run-up"),

@@ -46,6 +46,8 @@ CALLS: list[tuple[str, tuple[Any, ...], dict[str, Any], str]] = [
     ("duty", (3,), {"exponent": 5, "start": 2}, "exponent=5&start=2"),
     ("forces", (3,), {"load_rating": "12 kN", "bearing": "roller", "share": 0.5, "points": 50},
      "load_rating=12 kN&bearing=roller&share=0.5&points=50"),
+    ("startup", (3,), {"ramp": "0.5 s", "load_ramp": 2, "within": "5 %", "start": 1},
+     "ramp=0.5 s&load_ramp=2&within=5 %&start=1"),
     ("strobes", (3,), {}, ""),
     ("branch", (3, LOAD, "0 N*m", 1), {"start": 1}, "along=shaft.load&from=0 N*m&to=1&start=1"),
     ("diagram", (3, LOAD), {"low": 0, "high": 1, "phase": "90 deg", "points": 5, "strobes": 9},

@@ -77,6 +77,7 @@ FURTHER_RULES: Final = (
     "get_engagements",
     "get_duty",
     "get_forces",
+    "get_startup",
     "get_strobes",
     "get_audit",
     "add_user",

@@ -62,6 +62,7 @@ from sprag_study.worker.models.vibration_drive.settled import (
     is_settled,
     mean_periods,
     settings_of,
+    settled_study,
     swings,
 )
 from sprag_study.worker.models.vibration_drive.swept import start_of, swept
@@ -78,7 +79,8 @@ if TYPE_CHECKING:
     from sprag_study.engine.vibration_drive.examined import Examined
     from sprag_study.worker.models.branches import Along, CaseBranch
     from sprag_study.worker.models.forces import Bearing, Forces
-    from sprag_study.worker.models.model import Clutches, Reactions, Strobes
+    from sprag_study.worker.models.model import Clutches, Reactions, StartUps, Strobes
+    from sprag_study.worker.models.ramps import Ramps, StartUp
     from sprag_study.worker.models.sections import CaseSections, Sampling
     from sprag_study.worker.models.turns import CaseTurn
     from sprag_study.worker.study import Study
@@ -145,16 +147,17 @@ _COEFFICIENT = re.compile(r"(?:^|\.)clutch\.coefficients\.(\d+)$")
 
 
 #: Last part of the key of a kernel with torques that depend on speeds, of one with loads that are no polynomials of
-#: them too, and of one with loads that are tables over them besides.
+#: them too, of one with loads that are tables over them besides, and of one with ramps of excitation and load.
 _DRAG: Final = "drag"
 _CURVE: Final = "curve"
 _TABLE: Final = "table"
+_RAMP: Final = "ramp"
 
 
 class DriveKey(NamedTuple):
     """Key of the kernel of a vibration drive; ``drag``: with torques that depend on speeds, ``curved``: with loads that
     are no polynomials of the speed too, ``tabled``: with loads that are tables over it besides; ``harmonics``: with
-    room for as many harmonics of the base, a number that then ends the key.
+    room for as many harmonics of the base, a number that then ends the key; ``ramped``: with ramps.
     """
 
     pendulums: int
@@ -164,11 +167,15 @@ class DriveKey(NamedTuple):
     curved: bool = False
     tabled: bool = False
     harmonics: int = 0
+    ramped: bool = False
 
     @property
     def shape(self) -> KernelShape:
         """The shape with this key."""
-        terms = (_TABLE,) if self.tabled else (_CURVE,) if self.curved else (_DRAG,) if self.drag else ()
+        terms: tuple[str, ...] = (
+            (_TABLE,) if self.tabled else (_CURVE,) if self.curved else (_DRAG,) if self.drag else ()
+        )
+        terms += (_RAMP,) if self.ramped else ()
         room = (self.harmonics,) if self.harmonics else ()
         return KernelShape(MODEL, (*self[:3], *terms, *room))
 
@@ -399,6 +406,10 @@ class VibrationDrive(Model):
     def strobes(self) -> Strobes:
         return _Strobes()
 
+    @property
+    def start_ups(self) -> StartUps:
+        return _StartUps()
+
     def lanes_per_case(self, study: Study) -> int:
         return count_of(study.run)
 
@@ -425,7 +436,7 @@ class VibrationDrive(Model):
     def known_answers(self, shape: KernelShape) -> bytes:
         from sprag_study.engine.vibration_drive.simulate import simulate
 
-        pendulums, coefficients, tolerance, drag, curved, tabled, harmonics = _key_of(shape)
+        pendulums, coefficients, tolerance, drag, curved, tabled, harmonics, ramped = _key_of(shape)
         columns = _DRIVEN | (_DRAG_OF_IT if drag else {}) | (_CURVE_OF_IT if curved else {})
         columns |= _TABLE_OF_IT if tabled else {}
         for number in range(harmonics):
@@ -435,6 +446,10 @@ class VibrationDrive(Model):
         for number in range(pendulums):
             columns |= {f"pendulums.{number}.{name}": value for name, value in swinging.items()}
         columns |= {f"clutch.coefficients.{k}": 200.0 for k in range(max(1, coefficients))}
+        if ramped:
+            from sprag_study.engine.vibration_drive.start_up import ramp_answers
+
+            return ramp_answers(columns, tolerance)
         run = Run(duration=Span(20.0, "periods"), tolerance=tolerance)
         return simulate(columns, run, cases=1).values.tobytes()
 
@@ -476,6 +491,18 @@ class _Reactions:
         if is_settled(study.run):
             return settled_forces(columns, settings_of(study.run), bearing, points, start_of(study, case))
         return forces(columns, run_of(study.run), bearing, points)
+
+
+class _StartUps:
+    def shape(self, study: Study) -> KernelShape:
+        return _key_of(VibrationDrive().shape_of(study))._replace(ramped=True).shape
+
+    def run(self, study: Study, case: int, ramps: Ramps, points: int) -> StartUp:
+        from sprag_study.engine.vibration_drive.start_up import start_up
+
+        settled = study if is_settled(study.run) else settled_study(study)
+        columns = case_machine(study, case)
+        return start_up(columns, ramps, settings_of(settled.run), points, start_of(study, case))
 
 
 class _Strobes:
@@ -550,6 +577,6 @@ def _key_of(shape: KernelShape) -> DriveKey:
     room = [part for part in shape.key[3:] if isinstance(part, int)]
     terms = tuple(part for part in shape.key[3:] if isinstance(part, str))
     numbers = cast("tuple[int, int, float]", shape.key[:3])
-    curved = terms in {(_CURVE,), (_TABLE,)}
-    drag, tabled = curved or terms == (_DRAG,), terms == (_TABLE,)
-    return DriveKey(*numbers, drag=drag, curved=curved, tabled=tabled, harmonics=sum(room))
+    curved, tabled = not {_CURVE, _TABLE}.isdisjoint(terms), _TABLE in terms
+    drag, ramped = curved or _DRAG in terms, _RAMP in terms
+    return DriveKey(*numbers, drag=drag, curved=curved, tabled=tabled, harmonics=sum(room), ramped=ramped)

@@ -142,7 +142,7 @@ PAGES: Final[dict[str, list[str]]] = {
         "/studies/{STUDY}/cases/0", "/studies/{SHAFT}/cases/0", "/studies/{SHAFT}/cases/0?show=transient",
         *(
             f"/studies/{{STUDY}}/cases/0?show={part}"
-            for part in ("engagements", "duty", "forces", "strobes", "section", "branch")
+            for part in ("engagements", "duty", "forces", "strobes", "section", "startup", "branch")
         ),
     ],
     "/studies/{study_id}/cases/{case}/laboratory": ["/studies/{STUDY}/cases/0/laboratory"],
