@@ -14,6 +14,7 @@ Kind = Literal["real", "count", "category"]
 IN_DEGREES = Sentence("was it in degrees?")
 IN_MM = Sentence("was it in mm?")
 IN_RPM = Sentence("was it in rpm?")
+IN_PERCENT = Sentence("was it in percent?")
 IN_ANOTHER_UNIT = Sentence("was it in another unit?")
 
 

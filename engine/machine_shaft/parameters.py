@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from itertools import chain
 
-from sprag_study.engine.catalogue import IN_MM, IN_RPM, STANDARD_GRAVITY, Parameter
+from sprag_study.engine.catalogue import IN_MM, IN_PERCENT, IN_RPM, STANDARD_GRAVITY, Parameter
 from sprag_study.engine.machine_shaft.elements import ElementKind
 from sprag_study.engine.machine_shaft.spec import (
     MOVING,
@@ -23,6 +23,8 @@ _TURN = 2.0 * math.pi
 _ANY = 1e30
 #: Longest plausible part, in m.
 _LONGEST = 10.0
+#: Largest plausible relative damping of a coupling: rubber has up to about 2.
+_MOST_DAMPING = 4.0
 
 
 def _length(path: str, symbol: str, help_: str, default: float | None = None) -> Parameter:
@@ -245,7 +247,7 @@ def _stage(index: int, kind: Stage) -> tuple[Parameter, ...]:
         loss = "energy lost in a cycle of vibration over the largest elastic energy"
         return (
             Parameter(f"{p}.stiffness", "k", "N*m/rad", 0.0, 1e12, True, None, stiff),
-            Parameter(f"{p}.relative_damping", "psi", "1", 0.0, 100.0, False, 0.0, loss),
+            Parameter(f"{p}.relative_damping", "psi", "1", 0.0, 100.0, False, 0.0, loss, _MOST_DAMPING, IN_PERCENT),
             output,
             common[0],
         )

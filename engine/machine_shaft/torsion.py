@@ -27,9 +27,10 @@ Floats = NDArray[np.float64]
 
 #: Harmonics of the cycle that are computed first, and at most: at least the last number of them a revolution.
 FIRST_ORDERS, MOST_ORDERS, ORDERS_A_TURN = 64, 512, 32
-#: There are enough where the last one is that many times as fast as the highest natural frequency, or where the last
-#: quarter of them is that small a share of the largest.
-_BEYOND, _SMALL = 8.0, 1e-11
+#: There are enough where the last one is that many times as fast as the highest natural frequency. There are enough
+#: before, where the last quarter of them is that small a share of the largest, and all together have the mean square
+#: of what excites the train (Parseval) but for that share.
+_BEYOND, _SMALL, _LEFT = 8.0, 1e-11, 1e-12
 #: Share of the largest harmonic of the torque in a coupling, rigid or elastic, from which another one counts.
 EXCITING = 0.1
 #: Share of the largest torque below which a torque is a rounding error.
@@ -189,14 +190,14 @@ def answered(train: Train, signals: Signals, pace: float, turns: int) -> Answer:
     enough = min(most, FIRST_ORDERS * int(np.ceil(min(_BEYOND * natural[-1] / pace, most) / FIRST_ORDERS)))
     orders = FIRST_ORDERS
     while True:
-        drive, acceleration = _harmonics(signals, orders)
+        drive, acceleration, whole = _harmonics(signals, orders)
         mean = 0.5 * float(drive[0, 0])
         rigid = np.ascontiguousarray((drive - before[:, None, None] * acceleration)[..., 1:])
         elastic = np.empty_like(rigid)
         _amplified(train.inertias, train.stiffness, train.damping, pace, rigid, elastic)
         sizes = np.abs(elastic).max(axis=1)
         small = sizes[:, 3 * orders // 4 :].max(axis=1) <= _SMALL * np.maximum(sizes.max(axis=1), abs(mean))
-        if small.all() or orders >= enough:
+        if (whole and small.all()) or orders >= enough:
             break
         orders = enough
     places = 2.0 * np.pi / (_PLACES * orders) * np.arange(_PLACES * orders)
@@ -214,27 +215,33 @@ def _finer(pieces: int) -> Floats:
     return apply(np.ascontiguousarray(COEFFICIENTS.T), powers)
 
 
-def _harmonics(signals: Signals, orders: int) -> tuple[Floats, Floats]:
+def _harmonics(signals: Signals, orders: int) -> tuple[Floats, Floats, bool]:
     """Coefficients of cos and sin of driving torque and acceleration, from order 0: each of shape (2, orders + 1).
 
-    A panel is divided into as many parts as the last order needs.
+    The third value says whether they are all that there are. A panel is divided into as many parts as the last order
+    needs.
     """
     width = 2.0 * (signals.unit[:, -1] - signals.unit[:, 0]) / (POSITIONS[-1] - POSITIONS[0])
     pieces = np.maximum(np.ceil(orders * width / _RESOLVED), 1.0).astype(np.int64)
-    out = np.zeros((2, 2, orders + 1))
+    out, squares = np.zeros((2, 2, orders + 1)), np.zeros(2)
     for count in np.unique(pieces).tolist():
         unit, pace, drive, acceleration = (apply(_finer(count), own[pieces == count]).ravel() for own in signals)
         steps = np.tile(WEIGHTS, len(pace) // NODES) * pace / count
-        _sums(np.stack([drive, acceleration]), elementary.cos(unit), elementary.sin(unit), steps, out)
-    return out[0], out[1]
+        _sums(np.stack([drive, acceleration]), elementary.cos(unit), elementary.sin(unit), steps, out, squares)
+    left = np.empty(2)
+    _left(out, squares, left)
+    return out[0], out[1], bool((left <= _LEFT * squares).all())
 
 
 @compiled
-def _sums(values: Floats, cosine: Floats, sine: Floats, steps: Floats, out: Floats) -> None:
+def _sums(values: Floats, cosine: Floats, sine: Floats, steps: Floats, out: Floats, squares: Floats) -> None:
     """Fourier coefficients of each row of ``values`` (rows, n), twice the mean first, added to ``out``
-    (rows, 2, orders).
+    (rows, 2, orders), and the mean square, added to ``squares`` (rows,).
     """
     count = len(steps)
+    for row in range(len(values)):
+        for j in range(count):
+            squares[row] += steps[j] * values[row, j] * values[row, j]
     re, im = np.ones(count), np.zeros(count)
     for k in range(out.shape[2]):
         for row in range(len(values)):
@@ -249,6 +256,15 @@ def _sums(values: Floats, cosine: Floats, sine: Floats, steps: Floats, out: Floa
             turned = re[j] * cosine[j] - im[j] * sine[j]
             im[j] = re[j] * sine[j] + im[j] * cosine[j]
             re[j] = turned
+
+
+@compiled
+def _left(parts: Floats, squares: Floats, out: Floats) -> None:
+    """Mean squares that the harmonics ``parts`` (rows, 2, orders) leave of ``squares``, both of shape (rows,)."""
+    for row in range(len(parts)):
+        out[row] = squares[row] - 0.25 * parts[row, 0, 0] * parts[row, 0, 0]
+        for k in range(1, parts.shape[2]):
+            out[row] -= 0.5 * (parts[row, 0, k] * parts[row, 0, k] + parts[row, 1, k] * parts[row, 1, k])
 
 
 @compiled

@@ -52,9 +52,9 @@ def test_natural_frequencies_are_those_of_holzer_s_tables() -> None:
         assert np.square(frequencies(inertias, stiffness)) == pytest.approx(squares, rel=1e-9, abs=1e-10 * squares[-1])
 
 
-def answer_to(train: Train, pace: float, drive: Floats, load: Floats) -> Answer:
-    """The answer to torques on the first and on the last body: rows of order, cos and sin."""
-    panels = Panels.over(2.0 * math.pi, [], 16)
+def answer_to(train: Train, pace: float, drive: Floats, load: Floats, count: int = 16) -> Answer:
+    """The answer to torques on the first and on the last body, rows of order, cos and sin, with that many panels."""
+    panels = Panels.over(2.0 * math.pi, [], count)
     unit = panels.angles[0]
 
     def course(rows: Floats) -> Floats:
@@ -92,6 +92,16 @@ def test_harmonics_are_those_of_the_equations_of_the_angles_and_their_power_is_d
             lost = 0.5 * n * pace * (train.stiffness * train.damping / math.tau * np.abs(inner) ** 2).sum()
             speeds = 1j * n * pace * angles
             assert 0.5 * (forces * speeds.conj()).real.sum() == pytest.approx(lost, rel=1e-9)
+
+
+def test_a_single_harmonic_above_the_first_ones_is_seen() -> None:
+    train, pace = Train(np.array([1.0, 2.0]), np.array([3e5]), np.array([0.1])), 5.0
+    order = 130
+    answer = answer_to(train, pace, np.array([[0, 6.0, 0.0]]), np.array([[0, -6.0, 0.0], [order, 9.0, 0.0]]), 160)
+    masses, joined = matrices(train)
+    angles = np.linalg.solve(joined - (order * pace) ** 2 * masses, np.array([0.0, 9.0]))
+    amplitude = abs(joined[0, 0] * (angles[0] - angles[1]))
+    assert answer.ends[0] == pytest.approx([6.0 + amplitude, 6.0 - amplitude], rel=1e-8)
 
 
 def test_the_peak_is_that_of_a_long_integration_from_rest() -> None:

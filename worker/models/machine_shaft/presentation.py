@@ -129,10 +129,13 @@ _OF_MOTOR: Final = (
     "motor.speed.mean", "motor.torque.mean", "motor.torque.max", "motor.torque.rms", "motor.power.mean"
 )  # fmt: skip
 
-_OF_COUPLINGS: Final = (
-    "torsion.natural_frequency", "torsion.margin", "torsion.dynamic_factor", "torsion.torque.amplitude",
-    "torsion.reversals",
-)  # fmt: skip
+#: Of couplings: what follows the irregularity, what follows all others, and their answers.
+_OF_COUPLINGS: Final = ("torsion.dynamic_factor", "torsion.margin", "torsion.torque.amplitude")
+_FURTHER_OF_COUPLINGS: Final = ("torsion.natural_frequency", "torsion.reversals")
+_ANSWERS_OF_COUPLINGS: Final = (
+    Answer("dynamic_factor", CAPTIONS["torsion.dynamic_factor"], "torsion.dynamic_factor", "here", better="smaller"),
+    Answer("resonance_margin", CAPTIONS["torsion.margin"], "torsion.margin", "here", better="larger"),
+)
 
 
 def presentation_of(structure: Mapping[str, Any], paths: Collection[str] = ()) -> Presentation:
@@ -140,12 +143,14 @@ def presentation_of(structure: Mapping[str, Any], paths: Collection[str] = ()) -
 
     ``paths`` are those of its numbers.
     """
-    drive = structure.get("drive", {})
+    drive, shown = structure.get("drive", {}), PRESENTATION
     more: tuple[str, ...] = _OF_FLYWHEEL if drive.get("flywheel") else ()
     if drive.get("motor") or drive.get("stages"):
         more += _OF_MOTOR
-    if "coupling" in drive.get("stages", ()):
-        more += _OF_COUPLINGS
     if "drive.motor.rated_torque" in paths:
         more += ("motor.torque.margin",)
-    return replace(PRESENTATION, main=PRESENTATION.main + more) if more else PRESENTATION
+    if "coupling" in drive.get("stages", ()):
+        main = (*shown.main[:1], *_OF_COUPLINGS, *shown.main[1:])
+        shown = replace(shown, main=main, answers=(*shown.answers, *_ANSWERS_OF_COUPLINGS))
+        more += _FURTHER_OF_COUPLINGS
+    return replace(shown, main=shown.main + more) if more else shown

@@ -237,12 +237,15 @@ def test_couplings_have_results_and_warnings() -> None:
     names = [info.name for info in models.study_results(parsed.study)]
     frequencies = models.run_chunk(parsed.study, 0, 2).values[:, names.index("torsion.natural_frequency")]
     assert frequencies == pytest.approx([math.sqrt(stiff * (1.0 + 1.0 / 20.0)) for stiff in (2e3, 3e3)])
-    assert "torsion.dynamic_factor" in models.presentation_of(parsed.study).main
+    shown = models.presentation_of(parsed.study)
+    assert shown.main[:3] == ("irregularity", "torsion.dynamic_factor", "torsion.margin")
+    assert {"dynamic_factor", "resonance_margin"} <= {answer.name for answer in shown.answers}
     loaded = parse_spec(coupled({}, run={"loads": True})).study
     names = [info.name for info in models.study_results(loaded)]
     row = dict(zip(names, models.run_chunk(loaded, 0, 1).values[0].tolist(), strict=True))
     assert row["couplings.0.torque.amplitude"] == row["torsion.torque.amplitude"]
     resonant = parse_spec(coupled({"stiffness": "860 N*m/rad", "relative_damping": 0.1})).warnings
+    assert "was it in percent?" in parse_spec(coupled({"relative_damping": 50})).warnings[0]
     assert [warning.code for warning in resonant] == ["near-resonance", "torque-reverses"]
     assert "harmonic 3 of the cycle, 30 rad/s, is within 0.17 % of a torsional natural frequency" in resonant[0]
 
