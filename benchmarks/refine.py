@@ -2,8 +2,9 @@
 
     python -m benchmarks.refine [--error 0.01] [--family NAME] [--no-adaptive]
 
-Truth are 1,025 equally spaced places of each curve. A place counts where no reported jump interval contains it; for the
-peers, which report none, where no jump above 5 % lies within 8 places. A curve needs as many points as make every
+Truth are 1,025 equally spaced places of each curve. A place counts where no reported interval contains it, which
+is a jump or an irregular stretch (`benchmarks.refine_irregular` measures these); for the peers, which report none,
+where no jump above 5 % lies within 8 places. A curve needs as many points as make every
 result right to the error at 99 % of the places that count; a peer that needs more than 1,025 counts as 1,025.
 python-adaptive is not a dependency: ``pip install adaptive``.
 """
@@ -129,7 +130,7 @@ def measured(problem: Problem, truth: Truth, error: float) -> Outcome:
     values = np.stack([curve.values[name] for name in problem.results], axis=1)
     errors = truth.errors(curve.x, values)
     held, inside = np.zeros(PLACES - 1, dtype=bool), np.zeros(PLACES, dtype=bool)
-    for jump in curve.jumps:
+    for jump in (*curve.jumps, *curve.stretches):
         low, high = np.searchsorted(truth.x, [jump.low, jump.high])
         held[low:high] = True
         inside[low : high + 1] = True
@@ -188,7 +189,7 @@ def _line(name: str, outcome: Outcome, grid: int, peer: tuple[int, float] | None
     return (
         f"  {name}\n    {outcome.points:3d} points, {outcome.rounds} rounds; error {outcome.error:.2%}, reported "
         f"at most {outcome.estimate:.2%}; jumps {outcome.jumps}, missed {outcome.missed} (of these {outcome.islands} "
-        f"narrower than the finest interval); reported jumps {outcome.in_jumps:.1%} of the axis; "
+        f"narrower than the finest interval); reported {outcome.in_jumps:.1%} of the axis; "
         f"uniform {grid:4d}{other}"
     )
 

@@ -73,14 +73,14 @@ def _preset(name: str, values: Mapping[str | tuple[str, ...], float], run: dict[
     return replace(study, base=base, axes=(), run=study.run if run is None else own | run)
 
 
-def _over_speed(preset: str, amplitude: float, load: float, run: dict[str, Any] | None = None) -> Problem:
+def over_speed(preset: str, amplitude: float, load: float, run: dict[str, Any] | None = None) -> Problem:
     """A drive over 100 to 220 rad/s of excitation; amplitude in mm, load in N*m."""
     study = _preset(preset, {AMPLITUDE: amplitude * 1e-3, LOAD: load}, run)
     axis = AdaptiveAxis(FREQUENCY, 100.0 / (2.0 * math.pi), 220.0 / (2.0 * math.pi))
     return Problem(f"{preset} over frequency at {amplitude} mm, {load} N*m", study, (axis,))
 
 
-def _over_load(preset: str, nu: float, amplitude: float, run: dict[str, Any] | None = None) -> Problem:
+def over_load(preset: str, nu: float, amplitude: float, run: dict[str, Any] | None = None) -> Problem:
     """A drive over loads up to 1.2 N*m; angular frequency in rad/s, amplitude in mm."""
     study = _preset(preset, {FREQUENCY: nu / (2.0 * math.pi), AMPLITUDE: amplitude * 1e-3}, run)
     return Problem(f"{preset} over load at {nu} rad/s, {amplitude} mm", study, (AdaptiveAxis(LOAD, 0.0, 1.2),))
@@ -93,33 +93,33 @@ def _shaft(preset: str, path: str, low: float, high: float, **values: float) -> 
 
 def one_pendulum() -> list[Problem]:
     """Sixteen curves of the drive with one pendulum, settled."""
-    over_speed = ((1, 0.1), (1, 0.23), (1.5, 0.1), (1.5, 0.3), (2, 0.1), (2, 0.25), (3, 0.1), (3, 0.3))
-    over_load = ((110, 2), (130, 2), (140, 1), (157, 1), (157, 2), (175, 1.5), (190, 2), (210, 3))
+    speeds = ((1, 0.1), (1, 0.23), (1.5, 0.1), (1.5, 0.3), (2, 0.1), (2, 0.25), (3, 0.1), (3, 0.3))
+    loads = ((110, 2), (130, 2), (140, 1), (157, 1), (157, 2), (175, 1.5), (190, 2), (210, 3))
     preset = "one_pendulum"
     return [
-        *(_over_speed(preset, amplitude, load) for amplitude, load in over_speed),
-        *(_over_load(preset, nu, amplitude) for nu, amplitude in over_load),
+        *(over_speed(preset, amplitude, load) for amplitude, load in speeds),
+        *(over_load(preset, nu, amplitude) for nu, amplitude in loads),
     ]
 
 
 def two_pendulums() -> list[Problem]:
     """Eight curves of the drive with two pendulums, settled."""
     preset = "two_pendulums"
-    over_speed = ((1, 0.1), (1.5, 0.3), (2, 0.2), (3, 0.5))
-    over_load = ((125, 2), (150, 1.5), (175, 2), (200, 3))
+    speeds = ((1, 0.1), (1.5, 0.3), (2, 0.2), (3, 0.5))
+    loads = ((125, 2), (150, 1.5), (175, 2), (200, 3))
     return [
-        *(_over_speed(preset, amplitude, load) for amplitude, load in over_speed),
-        *(_over_load(preset, nu, amplitude) for nu, amplitude in over_load),
+        *(over_speed(preset, amplitude, load) for amplitude, load in speeds),
+        *(over_load(preset, nu, amplitude) for nu, amplitude in loads),
     ]
 
 
 def timed() -> list[Problem]:
     """Four curves of runs of a given time."""
     return [
-        _over_speed("one_pendulum", 2, 0.1, TIMED),
-        _over_speed("one_pendulum", 3, 0.3, TIMED),
-        _over_load("one_pendulum", 157, 2, TIMED),
-        _over_load("two_pendulums", 175, 2, TIMED),
+        over_speed("one_pendulum", 2, 0.1, TIMED),
+        over_speed("one_pendulum", 3, 0.3, TIMED),
+        over_load("one_pendulum", 157, 2, TIMED),
+        over_load("two_pendulums", 175, 2, TIMED),
     ]
 
 

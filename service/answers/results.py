@@ -130,6 +130,16 @@ class Jump(TypedDict):
     ]
 
 
+class Stretch(TypedDict):
+    """A part of a refined curve in which the motion is irregular: results scatter around the straight lines."""
+
+    low: Annotated[float, Doc("its ends, values of x, SI")]
+    high: float
+    half_widths: Annotated[
+        dict[str, float], Doc("by result: the largest half width of the band around its lines there, in its unit (SI)")
+    ]
+
+
 class Curve(TypedDict):
     """One curve; its lists of points are aligned."""
 
@@ -150,7 +160,7 @@ class Curve(TypedDict):
         Annotated[
             dict[str, float | None],
             Doc(
-                "of a refined curve: estimated largest error of straight lines between its points outside `jumps`, "
+                "of a refined curve: estimated largest error of straight lines outside `jumps` and `irregular`, "
                 "relative to the range, for each result that was asked for; null: not known yet"
             ),
         ]
@@ -160,6 +170,17 @@ class Curve(TypedDict):
     ]
     jumps: NotRequired[
         Annotated[list[Jump], Doc("of a refined curve: where it is not interpolated; of a sweep: jumps")]
+    ]
+    irregular: NotRequired[
+        Annotated[list[Stretch], Doc("of a refined curve: where results scatter around its lines by a half width")]
+    ]
+    band: NotRequired[
+        Annotated[
+            dict[str, list[float | None]],
+            Doc(
+                "of a refined curve: half width at each point, by result, straight in between; null where none scatters"
+            ),
+        ]
     ]
     passed: NotRequired[
         Annotated[

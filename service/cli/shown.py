@@ -187,6 +187,11 @@ def _refined(drawn: dict[str, Any], found: Mapping[str, Any], unit: str) -> Iter
         why, results = _(jump["why"].replace("_", " ")), ", ".join(jump["results"])
         place = _ends(jump, unit)
         yield _("jump at {place} ({why}): {results} not interpolated", place=place, why=why, results=results)
+    for stretch in drawn.get("irregular", ()):
+        place = _ends(stretch, unit)
+        for name in [name for name in stretch["half_widths"] if name in found["results"]]:
+            size = _absolute(stretch["half_widths"][name], found["results"][name]["unit"])
+            yield _("irregular at {place}: {name} within {size} of the line", place=place, name=name, size=size)
 
 
 def _ends(jump: dict[str, Any], unit: str) -> str:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sprag_study.sentences import Amount, Name
-from sprag_study.service.figures.figure import Band, Figure, Line, Marks, Panel, Quantity, line_colours
+from sprag_study.service.figures.figure import Band, Figure, Fill, Line, Marks, Panel, Quantity, line_colours
 from sprag_study.service.figures.orders import TITLE, order_map, strip_of
 from sprag_study.service.reading.reader import Phrase, joined, term
 from sprag_study.service.results.joined import joined_points
-from sprag_study.service.results.refined import jumps_of, sentence
+from sprag_study.service.results.refined import band, jumps_of, sentence
 from sprag_study.service.results.regimes import DOUBTFUL, MARKED, UNSETTLED, regimes_of
 from sprag_study.service.results.sweeps import hysteresis, values_text, without_direction
 from sprag_study.worker.codes import PENDING
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 _MOST_POINTS: Final = 24_000
 #: Name of the points of other motions than those that the lines are of.
 OTHER_MOTIONS: Final = Phrase("other motions of the same cases")
+#: Name of the band around a line where the motion is irregular.
+SCATTER: Final = Phrase("irregular motion: results scatter")
 _LEAST_POINTS: Final = 400
 _LINE_POINTS: Final = 6_000
 
@@ -55,7 +57,7 @@ def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1, *, apar
     occurring = tuple(regimes_of(_regimes(curve) for _, curve in lines))
     regimes = occurring if len(occurring) > 1 or set(occurring) & set(MARKED) else ()
     labels = [label for label, _ in drawn]
-    panels = []
+    panels: list[Panel] = []
     for index, info in enumerate(chosen.results):
         parts = (
             *_lines(lines, labels, info, chosen.units, listed=index == 0),
@@ -63,7 +65,9 @@ def curves_figure(drawn: Sequence[tuple[str, Curves]], columns: int = 1, *, apar
         )
         bands = tuple(_bands(lines, info)) if len(drawn) == 1 else ()
         marks = tuple(_marks(lines, info, regimes))
-        panels.append(Panel(Quantity(info.name, info.unit), parts, marks, bands=bands))
+        known = any(panel.fills for panel in panels)
+        fills = tuple(_fills(lines, info, known=known))
+        panels.append(Panel(Quantity(info.name, info.unit), parts, marks, bands=bands, fills=fills))
     most = min(max(_MOST_POINTS // len(lines), _LEAST_POINTS), _LINE_POINTS)
     spans, looks = strip_of(drawn[0][1].curves, chosen.units) if len(drawn) == 1 else ({}, {})
     return Figure(
@@ -99,6 +103,17 @@ def _bands(lines: Sequence[tuple[int, Curve]], info: ResultInfo) -> Iterator[Ban
         if curve.refined is not None:
             for jump in jumps_of(curve.refined, (info.name,)):
                 yield Band(jump["low"], jump["high"], colour, str(index))
+
+
+def _fills(lines: Sequence[tuple[int, Curve]], info: ResultInfo, *, known: bool) -> Iterator[Fill]:
+    """The bands in which a result of refined curves scatters; the legend has the first that is not ``known`` yet."""
+    for index, ((_, curve), colour) in enumerate(zip(lines, _colours(lines), strict=True)):
+        if curve.refined is None:
+            continue
+        x, low, high = band(curve.refined, info.name)
+        if x.size:
+            yield Fill(SCATTER, x, low, high, colour, str(index), listed=not known)
+            known = True
 
 
 def _both(lines: Sequence[tuple[int, Curve]]) -> bool:

@@ -356,11 +356,13 @@ class _Painting(Painting):
         unnamed = (line for line in figure.listed if line.heading or not (line.joined and line.name in named))
         listed = [] if own else list(unnamed)
         fills = [] if own else [fill for panel in figure.panels for fill in panel.fills if fill.listed]
+        if fills:
+            listed = [line for line in listed if line.name or line.heading]
         heading = ", ".join(map(title_of, figure.family)) or (gettext("Study") if figure.studies > 1 else "")
         listed = list(map(self._seen, listed))
         if len(listed) > MANY and not any(line.heading for line in listed):
             self._rows(blocks(listed, self._width - 20.0, heading))
-        elif len(listed) + len(fills) > (0 if named or figure.family else 1):
+        elif len(listed) + len(fills) > (0 if named or figure.family or fills else 1):
             self._rows(
                 rows_of([*map(fill_entry, map(self._filled, fills)), *grouped(listed)], self._width - 8.0, heading)
             )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sprag_study.service.answers import filled
 from sprag_study.service.answers.results import Curve as CurveData
-from sprag_study.service.answers.results import CurvesData, Jump, MapData, MapPoints, MapResult, ResultMeaning
+from sprag_study.service.answers.results import CurvesData, Jump, MapData, MapPoints, MapResult, ResultMeaning, Stretch
 from sprag_study.service.json_text import numbers
 from sprag_study.service.reading.directions import in_words
 from sprag_study.service.results.refined import Line, RefinedMap, asked_errors, jumps_of
@@ -92,6 +92,14 @@ class Curve:
     flags: list[str] | None = None
     usable: dict[str, Bools] | None = None
 
+    def band(self, name: str) -> list[float | None]:
+        """The half width around the lines of a refined result at each case; None where it does not scatter."""
+        widths: list[float | None] = [None] * len(self.endings)
+        if self.refined is not None:
+            for place, width in zip(self.run().tolist(), self.refined.half_widths[name].tolist(), strict=True):
+                widths[place] = width if np.isfinite(width) else None
+        return widths
+
     def known(self, name: str) -> Floats:
         """A result of each case; NaN where there is none that counts."""
         return self.y[name] if self.usable is None else np.where(self.usable[name], self.y[name], np.nan)
@@ -141,7 +149,16 @@ class Curve:
         absolute = {
             name: None if error is None else error * self.refined.ranges[name] for name, error in errors.items()
         }
-        return {**data, "error": errors, "error_absolute": absolute, "jumps": jumps, "passed": self.refined.passed}
+        irregular: list[Stretch] = [stretch.to_json() for stretch in self.refined.stretches]  # type: ignore[misc]
+        return {
+            **data,
+            "error": errors,
+            "error_absolute": absolute,
+            "jumps": jumps,
+            "irregular": irregular,
+            "band": {info.name: self.band(info.name) for info in results if info.name in errors},
+            "passed": self.refined.passed,
+        }
 
 
 @dataclass(frozen=True, slots=True)

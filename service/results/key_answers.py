@@ -365,6 +365,14 @@ class _Reader:
         known = [] if widths is None else [float(widths[place]) for place in places if np.isfinite(widths[place])]
         return max(known, default=None)
 
+    def _band(self, info: ResultInfo, part: int) -> tuple[float, float] | None:
+        """The half widths at the ends of a part of a refined curve in which the result scatters; None elsewhere."""
+        refined = self._curve.refined
+        if refined is None or info.name not in refined.scattered or not refined.scattered[info.name][part]:
+            return None
+        widths = refined.half_widths[info.name]
+        return float(widths[part]), float(widths[part + 1])
+
     def _at_zero(self, answer: Answer, info: ResultInfo) -> ReadAnswer:
         places = np.flatnonzero(self._x == 0.0)
         if not places.size:
@@ -438,6 +446,10 @@ class _Reader:
             if not np.isfinite(first + last):
                 continue
             share = (point - self._x[places[0]]) / (self._x[places[1]] - self._x[places[0]])
-            ends = {"low": float(self._x[places[0]]), "high": float(self._x[places[1]])}
-            return self._of(answer, info, places, first + share * (last - first), cases=2, **ends, x=point)
+            found = self._of(
+                answer, info, places, first + share * (last - first), cases=2, x=point,
+                low=float(self._x[places[0]]), high=float(self._x[places[1]]),
+            )  # fmt: skip
+            widths = self._band(info, stretch[after - 1])
+            return found if widths is None else replace(found, half_width=widths[0] + share * (widths[1] - widths[0]))
         return replace(nothing, why="not-joined", low=low, high=high)

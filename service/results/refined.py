@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ from sprag_study.service.languages import N_
 from sprag_study.service.reading.reader import Phrase, joined, plural
 from sprag_study.service.reading.wording import percent
 from sprag_study.worker import models
+from sprag_study.worker.planning.curves import Why
 from sprag_study.worker.planning.refine import Curve as Refined
 from sprag_study.worker.planning.refine import describe
 from sprag_study.worker.planning.refine_plan import REFINE, ErrorBound, RefinePlan
@@ -141,7 +142,8 @@ def stretches(refined: Refined, name: str, regimes: Sequence[Ints]) -> tuple[Int
     joined = refined.joined.get(name)
     if joined is not None:
         return _split(joined)
-    joined = np.logical_and.reduce(list(refined.joined.values()))
+    known = refined.joined.items()
+    joined = np.logical_and.reduce([own & ~refined.scattered[other] for other, own in known])
     whole = _split(joined)
     number = np.concatenate([np.full(part.size, place) for place, part in enumerate(whole)])
     found = []
@@ -155,18 +157,56 @@ def _split(joined: Bools) -> tuple[Ints, ...]:
 
 
 def jumps_of(refined: Refined, names: Iterable[str]) -> list[Jump]:
-    """The intervals in which lines of these results are broken; of one that was not asked for, all."""
+    """The intervals in which lines of these results are broken; of one that was not asked for, all.
+
+    A result that was not asked for has no band where the motion is irregular: its lines are broken there, too.
+    """
     wanted = set(names)
     every = not wanted <= refined.joined.keys()
-    return [jump.to_json() for jump in refined.jumps if every or wanted & set(jump.results)]  # type: ignore[misc]
+    jumps: list[Jump] = [jump.to_json() for jump in refined.jumps if every or wanted & set(jump.results)]  # type: ignore[misc]
+    if every:
+        irregular = Why.IRREGULAR.value
+        jumps += [
+            {"low": own.low, "high": own.high, "why": irregular, "results": [*own.half_widths]}
+            for own in refined.stretches
+        ]
+    return sorted(jumps, key=lambda jump: jump["low"])
+
+
+def band(refined: Refined, name: str) -> tuple[Floats, Floats, Floats]:
+    """The band around the lines of a result where the motion is irregular: x, low and high, with NaN between stretches.
+
+    Empty where there is none, also of a result that was not asked for.
+    """
+    scattered = refined.scattered.get(name, np.zeros(0, dtype=bool))
+    parts = [
+        np.append(own, own[-1] + 1)
+        for own in np.split(np.flatnonzero(scattered), np.flatnonzero(np.diff(np.flatnonzero(scattered)) > 1) + 1)
+        if own.size
+    ]
+    if not parts:
+        return (np.zeros(0),) * 3
+    values, widths, gap = refined.values[name], refined.half_widths[name], [np.nan]
+    columns = (refined.x, values - widths, values + widths)
+    return tuple(np.concatenate([np.append(column[own], gap) for own in parts]) for column in columns)  # type: ignore[return-value]
 
 
 def not_joined(refined: Refined, names: Sequence[str]) -> list[str]:
     """For each point the results that are not interpolated to the next point, with a space between them."""
-    asked = [name for name in names if name in refined.joined]
+    return _named(refined, names, {name: ~own for name, own in refined.joined.items()})
+
+
+def scattered(refined: Refined, names: Sequence[str]) -> list[str]:
+    """For each point the results that scatter around the line to the next point, with a space between them."""
+    return _named(refined, names, refined.scattered)
+
+
+def _named(refined: Refined, names: Sequence[str], parts: Mapping[str, Bools]) -> list[str]:
+    """For each point the names of those results of which its part up to the next point is one of ``parts``."""
+    asked = [name for name in names if name in parts]
     texts = [
-        " ".join(name for name, one in zip(asked, row, strict=True) if not one)
-        for row in zip(*(refined.joined[name].tolist() for name in asked), strict=True)
+        " ".join(name for name, one in zip(asked, row, strict=True) if one)
+        for row in zip(*(parts[name].tolist() for name in asked), strict=True)
     ]
     return [*(texts or [""] * (len(refined.x) - 1)), ""] if len(refined.x) else []
 
@@ -221,8 +261,27 @@ def _sentence(plan: RefinePlan, curves: Sequence[Refined], results: Sequence[Res
     text = reached(bound, error, outside, results[0].unit, passed=passed, failed=failed)
     if 0 < without < len(curves):
         missing = plural("{count} curve has no result.", "{count} curves have no result.", without)
-        text = Phrase("{text} {missing}", text=text, missing=missing)
-    return text
+        text = joined(" ", [text, missing])
+    irregular = _irregular(curves, results, absolute=bound.absolute)
+    return joined(" ", [text, irregular]) if irregular else text
+
+
+def _irregular(curves: Sequence[Refined], results: Sequence[ResultInfo], *, absolute: bool) -> Phrase | None:
+    """How far results scatter where the motion is irregular, for people; None where none does."""
+    asked = [info.name for info in results]
+    steps = [np.logical_or.reduce([curve.scattered[name] for name in asked]) for curve in curves]
+    length = sum(float(np.diff(curve.x)[own].sum()) for curve, own in zip(curves, steps, strict=True))
+    if not length:
+        return None
+    most = max(
+        width / (1.0 if absolute else curve.ranges[name])
+        for curve in curves for stretch in curve.stretches for name, width in stretch.half_widths.items()
+        if name in asked
+    )  # fmt: skip
+    size = Amount(most, results[0].unit, digits=2) if absolute else Phrase("{share} of the range", share=percent(most))
+    share = percent(length / sum(float(np.ptp(curve.x)) for curve in curves if len(curve.x)))
+    text = N_("Where the motion is irregular ({share} of the axis), results scatter around the line by up to {size}.")
+    return Phrase(text, share=share, size=size)
 
 
 def _has_result(curve: Refined, names: Iterable[str]) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from sprag_study.service import exports
 from sprag_study.service.answers import results as m
@@ -19,7 +19,7 @@ from sprag_study.service.results.choice import held
 from sprag_study.service.results.curve_cases import check_map, drawn_curves, select, stored_curves, stored_map
 from sprag_study.service.results.curves import CurveQuery, Curves, Map, Pairs, flag_names
 from sprag_study.service.results.defaults import completed, drawn_numbers
-from sprag_study.service.results.refined import not_joined
+from sprag_study.service.results.refined import not_joined, scattered
 from sprag_study.service.results.refined_maps import check_refined_map, map_plan
 from sprag_study.service.results.regimes import kind_columns
 from sprag_study.service.views import study_view
@@ -34,7 +34,12 @@ if TYPE_CHECKING:
     from sprag_study.service.reading.reader import Reading
     from sprag_study.service.results.curves import Curve
     from sprag_study.service.views.library import Library
+    from sprag_study.worker.planning.refine_plan import RefinePlan
     from sprag_study.worker.study import Study
+
+
+#: Behind the name of a result: the half width of its band where the motion is irregular, a column of tables.
+BAND: Final = ".band"
 
 
 def pairs(texts: Sequence[str] | None, parameter: str = "at") -> Pairs:
@@ -112,8 +117,9 @@ class CurvesView(StudyView[CurvesQuestion, CurveQuery, Curves]):
     def csv(self, answer: CurvesAnswer, reading: Reading) -> bytes:
         """Every point of every curve as one row: fixed parameters, case, x, results, regime and its order, ending.
 
-        Of refined curves also the results that are not interpolated up to the next point, of a sweep whether the motion
-        jumps between this point and the next.
+        Of refined curves also the results that are not interpolated up to the next point, and of settled ones those
+        that scatter up to there, with the half widths of their bands; of a sweep whether the motion jumps between this
+        point and the next.
         """
         curves = answer.result
         names, infos = kind_columns(curves.selection.regime), curves.selection.results
@@ -125,11 +131,13 @@ class CurvesView(StudyView[CurvesQuestion, CurveQuery, Curves]):
                 **dict(zip(names, (curve.regimes or [], curve.orders or []), strict=False)),
                 **_jumped(curve),
                 **_not_joined(curve, [info.name for info in infos]),
+                **_scattered(curve, curves.selection.plan, [info.name for info in infos]),
                 **curve.ends(),
             }
             for curve in curves.curves
         )
         units = {**curves.selection.units, **{info.name: info.unit for info in curves.selection.results}}
+        units |= {f"{info.name}{BAND}": info.unit for info in curves.selection.results}
         return exports.read_table(columns, units, reading.units)
 
     def figure(self, answer: CurvesAnswer, columns: int = 2) -> Figure:
@@ -158,6 +166,18 @@ def _not_joined(curve: Curve, names: list[str]) -> dict[str, list[Any]]:
     for place, text in zip(curve.run().tolist(), not_joined(curve.refined, names), strict=True):
         texts[place] = text
     return {"not_joined": texts}
+
+
+def _scattered(curve: Curve, plan: RefinePlan | None, names: list[str]) -> dict[str, list[Any]]:
+    """Columns of settled refined curves: the results that scatter from the point of a row to the next one, and their
+    half widths at the point.
+    """
+    if curve.refined is None or plan is None or not plan.regime:
+        return {}
+    texts = [""] * len(curve.endings)
+    for place, text in zip(curve.run().tolist(), scattered(curve.refined, names), strict=True):
+        texts[place] = text
+    return {"irregular": texts, **{f"{name}{BAND}": curve.band(name) for name in names if name in plan.results}}
 
 
 class MapView(StudyView[MapQuestion, tuple[CurveQuery, bool], Map]):

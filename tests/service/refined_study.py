@@ -11,6 +11,7 @@ from sprag_study.service.spec.document import parse_spec
 from sprag_study.service.storage.studies.records import CaseColumns
 from sprag_study.worker import models
 from sprag_study.worker.models import ChunkResult
+from sprag_study.worker.models.vibration_drive.settled import IRREGULAR
 from sprag_study.worker.planning import planner_of
 from sprag_study.worker.planning.rounds import Rows
 from sprag_study.worker.rounds import Rounds
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 SPEED, TORQUE, EFFICIENCY = "shaft.speed.mean", "torque.max", "efficiency"
 #: Where the speed jumps at 20 Hz, N*m.
 JUMP = 0.33
+#: Loads between which the motion of settled studies is irregular, N*m, and the half width of the efficiency there.
+ZONE, HALF_WIDTH = (0.6, 0.8), 0.05
 SPEC: dict[str, Any] = changed(
     {
         "/name": "Refined",
@@ -64,6 +67,15 @@ def value_of(name: str, points: NDArray[np.float64]) -> NDArray[np.float64]:
     if points.shape[1] == 3:
         return map_value(name, points)
     frequency, load = points[:, 0], points[:, 1]
+    irregular = (load > ZONE[0]) & (load < ZONE[1])
+    settled = {
+        "regime": np.where(irregular, IRREGULAR, 1.0),
+        "regime.order": np.where(irregular, np.nan, 1.0),
+        f"{EFFICIENCY}.half_width": np.where(irregular, HALF_WIDTH, np.nan),
+        f"{SPEED}.half_width": np.where(irregular, 1e-3, np.nan),
+    }
+    if name in settled:
+        return settled[name]
     if name == SPEED:
         return 30.0 - 20.0 * load**2 - np.where((frequency == 20.0) & (load > JUMP), 8.0, 0.0)
     return load * (2.0 - load) if name == EFFICIENCY else 5.0 + load

@@ -80,6 +80,8 @@ class Intervals:
         How much a point in the middle is worth: the larger the more.
     nodes : bool array, shape (curves, finest + 1)
         The points between which the intervals lie, as of `_nodes`.
+    mixed : bool array, shape (intervals,)
+        Whether the interval lies between irregular motions that are close to each other.
     """
 
     curve: Ints
@@ -91,6 +93,7 @@ class Intervals:
     why: Ints
     worth: Floats
     nodes: Bools
+    mixed: Bools
 
 
 @dataclass(frozen=True)
@@ -116,7 +119,7 @@ def intervals(samples: Samples) -> Intervals:
     if not len(curve):
         none = np.zeros((0, len(plan.results)))
         nothing = np.zeros(0, dtype=bool)
-        return Intervals(curve, low, width, nothing, none, none > 0.0, curve, np.zeros(0), nodes)
+        return Intervals(curve, low, width, nothing, none, none > 0.0, curve, np.zeros(0), nodes, nothing)
     raw, worst = _of_ancestor(triples, curve, low, 2 * width)
     _, before = _of_ancestor(triples, curve, low, 4 * width)
     most = max(1, plan.finest // (plan.start - 1) // _DIVIDED)
@@ -142,7 +145,19 @@ def intervals(samples: Samples) -> Intervals:
     why = _reasons(samples, curve, low, width, both, np.asarray(jumps.any(axis=1)), within)
     worst = np.minimum(np.maximum(worst, within.worst), 1.0)
     worth = np.where(width > plan.finest // (plan.start - 1), 2.0 * width, worst)
-    return Intervals(curve, low, width, resolved, errors, reported, why, worth, nodes)
+    mixed = _mixed(samples, nodes, curve, low, width, most) & ~within.missing
+    return Intervals(curve, low, width, resolved, errors, reported, why, worth, nodes, mixed)
+
+
+def _mixed(samples: Samples, nodes: Bools, curve: Ints, low: Ints, width: Ints, narrow: int) -> Bools:
+    """Intervals between two points of irregular motion at most ``narrow`` apart, with results at both ends."""
+    size = nodes.shape[1]
+    places, far = np.arange(size), 4 * size
+    irregular = nodes & samples.irregular[:, :size]
+    before = np.maximum.accumulate(np.where(irregular, places, -far), axis=1)
+    after = np.minimum.accumulate(np.where(irregular, places, far)[:, ::-1], axis=1)[:, ::-1]
+    near = after[curve, low + width] - before[curve, low] <= narrow
+    return np.asarray(near & samples.ok[curve, low] & samples.ok[curve, low + width])
 
 
 def _nodes(samples: Samples) -> Bools:

@@ -6,6 +6,7 @@ say everything that there is to know, so that `describe` gives the same curves f
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -28,6 +29,11 @@ if TYPE_CHECKING:
 
 #: Numbers of the reasons that are named by the first of them where they are neighbours.
 _CHANGES: Final = tuple(REASONS.index(why) for why in (Why.REGIME, Why.ORDER, Why.STEEP, Why.SENSITIVE))
+
+#: Points to each side whose distances from their neighbours' lines count for the half width of a band.
+_NEAR: Final = 6
+#: The half width of the difference of two means of the same half width, relative to it.
+_BOTH: Final = math.sqrt(2.0)
 
 
 @dataclass(frozen=True)
@@ -54,6 +60,27 @@ class Jump:
 
 
 @dataclass(frozen=True)
+class Stretch:
+    """A part of a curve in which the motion is irregular and results scatter around a straight line.
+
+    Attributes
+    ----------
+    low, high : float
+        Its ends, SI.
+    half_widths : dict of str to float
+        The largest half width of each of the results concerned, in its unit (SI).
+    """
+
+    low: float
+    high: float
+    half_widths: dict[str, float]
+
+    def to_json(self) -> dict[str, Any]:
+        """As plain JSON data."""
+        return {"low": self.low, "high": self.high, "half_widths": self.half_widths}
+
+
+@dataclass(frozen=True)
 class Curve(Described):
     """A refined curve.
 
@@ -67,7 +94,13 @@ class Curve(Described):
         As of `Described`, with ``ranges``, ``shares`` and ``asked``; the interpolation is by straight lines.
     joined : dict of str to bool array, each shape (points - 1,)
         Whether a straight line from each point to the next shows the result.
+    scattered : dict of str to bool array, each shape (points - 1,)
+        Whether the result scatters around this line by the half width instead of the error.
+    half_widths : dict of str to float64 array, each shape (points,)
+        Half width at each point of such a line, between them by straight lines; NaN elsewhere.
     jumps : tuple of Jump
+    stretches : tuple of Stretch
+        Where results scatter.
     """
 
     fixed: dict[str, float]
@@ -75,20 +108,25 @@ class Curve(Described):
     ok: Bools
     values: dict[str, Floats]
     joined: dict[str, Bools]
+    scattered: dict[str, Bools]
+    half_widths: dict[str, Floats]
     errors: dict[str, float | None]
     ranges: dict[str, float]
     shares: dict[str, float]
     asked: float
     jumps: tuple[Jump, ...]
+    stretches: tuple[Stretch, ...]
     passed: bool
 
     def to_json(self) -> dict[str, Any]:
+        stretches = [stretch.to_json() for stretch in self.stretches]
         return {
             "fixed": self.fixed,
             "points": len(self.x),
             "failed": int((~self.ok).sum()),
             "errors": self.errors,
             "jumps": [jump.to_json() for jump in self.jumps],
+            **({"irregular": stretches} if stretches else {}),
             "passed": self.passed,
         }
 
@@ -140,11 +178,13 @@ def _curves(samples: Samples, own: Intervals) -> list[Curve]:
     present = (np.isfinite(values) & known[:, :, None]).any(axis=1)
     # A result that the whole curve lacks has no jumps beside those of the others.
     jumps = own.jumps & (present | ~present.any(axis=1, keepdims=True))[own.curve]
-    merged = _merged(samples.plan, own, jumps)
+    ends = np.isfinite(values[own.curve, own.low]) & np.isfinite(values[own.curve, own.low + own.width])
+    scattered = own.jumps & own.mixed[:, None] & ends
+    merged = _merged(samples.plan, own, jumps & ~scattered)
     parts = (slice(bounds[index], bounds[index + 1]) for index in range(len(known)))
     measures = list(zip(*samples.measures(), strict=True))
     return [
-        _curve(samples, own, index, part, jumps[part], merged[index], *measures[index])
+        _curve(samples, own, index, part, jumps[part], scattered[part], merged[index], *measures[index])
         for index, part in enumerate(parts)
     ]
 
@@ -155,6 +195,7 @@ def _curve(
     index: int,
     part: slice,
     jumps: Bools,
+    scattered: Bools,
     merged: list[Jump],
     ranges: Floats,
     shares: Floats,
@@ -165,16 +206,25 @@ def _curve(
     # The interval that holds each part between two points; the last one, without a line, stands for none.
     ends = np.append(own.nodes[index], np.zeros(1, dtype=bool))[np.minimum(places, plan.finest + 1)]
     held = (np.cumsum(ends) - 1)[:-1]
-    broken = np.vstack([own.jumps[part], np.ones((1, len(plan.results)), dtype=bool)])[held]
+    none = np.ones((1, len(plan.results)), dtype=bool)
+    broken = np.vstack([own.jumps[part] & ~scattered, none])[held]
+    within = np.vstack([scattered, ~none])[held]
+    x = plan.adaptive[0].at(places, plan.finest)
     # Relative to the ranges instead of the scales; exactly the same for a result without an error of its own.
     values, errors = samples.values[index, places], own.errors[part] * (shares / plan.error)
+    half_widths = {
+        name: _half_widths(x, values[:, k], samples.widths[index, places, k], within[:, k])
+        for k, name in enumerate(plan.results)
+    }
     passed = len(places) > 1 and bool(own.resolved[part].all())
     return Curve(
         fixed=plan.fixed_values(index),
-        x=plan.adaptive[0].at(places, plan.finest),
+        x=x,
         ok=samples.ok[index, places],
         values={name: values[:, k] for k, name in enumerate(plan.results)},
         joined={name: ~broken[:, k] for k, name in enumerate(plan.results)},
+        scattered={name: within[:, k] for k, name in enumerate(plan.results)},
+        half_widths=half_widths,
         errors={
             name: _largest_of(errors[~jumps[:, k], k], passed) if np.isfinite(values[:, k]).any() else None
             for k, name in enumerate(plan.results)
@@ -183,8 +233,43 @@ def _curve(
         shares=dict(zip(plan.results, shares.tolist(), strict=True)),
         asked=plan.error,
         jumps=tuple(merged),
+        stretches=_stretches(x, {name: within[:, k] for k, name in enumerate(plan.results)}, half_widths),
         passed=passed,
     )
+
+
+def _half_widths(x: Floats, values: Floats, own: Floats, scattered: Bools) -> Floats:
+    """Half width of the band around straight lines at each point, shape (points,); NaN where nothing is ``scattered``.
+
+    A mean beside the line differs from it by its own half width and by that of the line, which is at most as large.
+    Where points nearby are further from the line between their neighbours, the largest of these distances counts.
+    """
+    before, after = np.append(False, scattered), np.append(scattered, False)
+    part = np.cumsum(after & ~before)
+    member, inner = before | after, np.flatnonzero(before & after)
+    rough = np.where(member, 0.0, np.nan)
+    share = (x[inner] - x[inner - 1]) / (x[inner + 1] - x[inner - 1])
+    line = (1.0 - share) * values[inner - 1] + share * values[inner + 1]
+    rough[inner] = np.abs(values[inner] - line)
+    # Between two points alone, their difference.
+    alone = np.flatnonzero(scattered & ~before[:-1] & ~after[1:])
+    rough[alone] = rough[alone + 1] = np.abs(values[alone + 1] - values[alone])
+    widest = np.where(member, np.maximum(rough, _BOTH * own), np.nan)
+    for far in range(1, _NEAR + 1):
+        same = member[far:] & member[:-far] & (part[far:] == part[:-far])
+        widest[far:] = np.where(same, np.fmax(widest[far:], rough[:-far]), widest[far:])
+        widest[:-far] = np.where(same, np.fmax(widest[:-far], rough[far:]), widest[:-far])
+    return widest
+
+
+def _stretches(x: Floats, scattered: dict[str, Bools], half_widths: dict[str, Floats]) -> tuple[Stretch, ...]:
+    """The stretches of a curve, ascending; those of several results with the same ends are one."""
+    widths: dict[tuple[int, int], dict[str, float]] = {}
+    for name, own in scattered.items():
+        steps = np.diff(np.concatenate([[0], own.astype(np.int64), [0]]))
+        for first, last in zip(np.flatnonzero(steps > 0).tolist(), np.flatnonzero(steps < 0).tolist(), strict=True):
+            widths.setdefault((first, last), {})[name] = float(half_widths[name][first : last + 1].max())
+    return tuple(Stretch(float(x[first]), float(x[last]), widths[first, last]) for first, last in sorted(widths))
 
 
 def _largest_of(errors: Floats, passed: bool) -> float | None:

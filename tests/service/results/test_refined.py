@@ -15,7 +15,7 @@ import pytest
 from numpy.typing import NDArray
 
 from sprag_study.service.cli.shown import show_curves
-from sprag_study.service.figures.curves import curves_figure
+from sprag_study.service.figures.curves import SCATTER, curves_figure
 from sprag_study.service.figures.figure import BANDS, Figure, Line
 from sprag_study.service.figures.svg import svg
 from sprag_study.service.reading.quantities import Units
@@ -25,15 +25,17 @@ from sprag_study.service.report.document import report_of
 from sprag_study.service.results.curve_cases import draw, select
 from sprag_study.service.results.curves import CurveQuery, Curves
 from sprag_study.service.results.defaults import completed, main_query
+from sprag_study.service.results.key_answers import _Reader
 from sprag_study.service.results.rounds import sentence
 from sprag_study.service.storage.studies.records import CaseColumns, RoundProgress, RoundRecord
 from sprag_study.service.views.library import Library
 from sprag_study.worker import models
+from sprag_study.worker.models.presentation import Answer
 from sprag_study.worker.states import StudyState
 from sprag_study.worker.study import Study
 from tests.service.conftest import API, Service
 from tests.service.figures.seen import seen
-from tests.service.refined_study import EFFICIENCY, JUMP, SPEC, SPEED, TORQUE, fetched, fill, study_of
+from tests.service.refined_study import EFFICIENCY, HALF_WIDTH, JUMP, SPEC, SPEED, TORQUE, ZONE, fetched, fill, study_of
 
 WIDTH = 1.0 / 256.0
 
@@ -224,6 +226,60 @@ def test_the_answers_of_a_service(service: Service) -> None:
     pictures, _ = report_of(Library(service.store), study_id).further
     told = [[len(curve.refined.jumps) if curve.refined else None for curve in part.curves] for part in pictures]
     assert told == [[1, 0]] * len(pictures)
+
+
+def test_irregular_motion_is_a_line_with_a_band_on_every_front(
+    service: Service, capsys: pytest.CaptureFixture[str]
+) -> None:
+    spec = {**SPEC, "run": {}, "name": "Irregular"}
+    study_id = service.submit(spec)
+    fill(service, study_id)
+    curves = service.get(f"/studies/{study_id}/curves")
+    width = np.sqrt(2.0) * HALF_WIDTH
+    for curve in curves["curves"]:
+        (stretch,) = curve["irregular"]
+        assert [stretch["low"], stretch["high"]] == pytest.approx(ZONE, abs=1.0 / 64.0)
+        assert ZONE[0] < stretch["low"] < stretch["high"] < ZONE[1]
+        assert stretch["half_widths"] == {EFFICIENCY: pytest.approx(width)}
+        inside = [stretch["low"] <= x <= stretch["high"] for x in curve["x"]]
+        assert curve["band"][EFFICIENCY] == [pytest.approx(width) if own else None for own in inside]
+        assert curve["band"][SPEED] == [None] * len(inside)
+        assert not any(jump["low"] >= stretch["low"] and jump["high"] <= stretch["high"] for jump in curve["jumps"])
+    table = service.http.get(f"{API}/studies/{study_id}/curves", params={"format": "csv"}).text
+    rows = list(csv.DictReader(io.StringIO(table)))
+    marked = [row for row in rows if row["irregular"]]
+    assert {row["irregular"] for row in marked} == {EFFICIENCY}
+    assert {row["not_joined"] for row in marked} == {""}
+    banded = [row for row in rows if row[f"{EFFICIENCY}.band"]]
+    assert len(banded) == len(marked) + 2  # the last point of each stretch, too
+    assert float(banded[0][f"{EFFICIENCY}.band"]) == pytest.approx(width)
+    assert {row[f"{SPEED}.band"] for row in rows} == {""}
+    study = study_of(spec)
+    figure = curves_figure([("", drawn(study, y=(SPEED, EFFICIENCY, TORQUE)))])
+    assert [[fill.listed for fill in panel.fills] for panel in figure.panels] == [[], [True, False], []]
+    (fill_, _) = figure.panels[1].fills
+    assert np.nanmax(fill_.high - fill_.low) == pytest.approx(2.0 * width)
+    assert [np.nanmin(fill_.x), np.nanmax(fill_.x)] == pytest.approx(ZONE, abs=1.0 / 64.0)
+    assert svg(figure).count(SCATTER) == 1
+    share = percent(sum(own["irregular"][0]["high"] - own["irregular"][0]["low"] for own in curves["curves"]) / 2.0)
+    assert f"Where the motion is irregular ({share} of the axis), results scatter around the line by" in figure.below
+    # A result that was not asked for has no band: its lines end there.
+    line = lines_of(figure, TORQUE)[1]
+    assert line.stretches is not None
+    assert all(not ZONE[0] < line.x[part[:-1]].mean() < ZONE[1] for part in line.stretches if part.size > 1)
+    assert any(band.low < 0.7 < band.high for band in figure.panels[2].bands)
+    show_curves(curves)
+    assert f"{EFFICIENCY} within 0.071 of the line" in capsys.readouterr().err
+
+
+def test_a_value_read_off_a_band_has_its_half_width() -> None:
+    study = study_of({**SPEC, "run": {}})
+    info = next(info for info in models.study_results(study) if info.name == EFFICIENCY)
+    here = Answer("efficiency", "efficiency", EFFICIENCY, "here")
+    curve = drawn(study).curves[0]
+    inside, beside = (_Reader(study, curve, "shaft.load", load).read(here, info) for load in (0.7013, 0.5013))
+    assert inside.half_width == pytest.approx(np.sqrt(2.0) * HALF_WIDTH)
+    assert beside.half_width is None
 
 
 def test_a_study_in_which_nothing_varies_has_no_first_curves(service: Service) -> None:

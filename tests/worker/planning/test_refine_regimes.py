@@ -11,6 +11,7 @@ from sprag_study.worker.models.vibration_drive.settled import IRREGULAR
 from sprag_study.worker.planning.curves import Why
 from tests.worker.planning.refining import (
     LEAF,
+    LOAD,
     PLAN,
     SETTLED,
     Floats,
@@ -67,19 +68,94 @@ def test_a_jump_of_a_few_errors_is_told() -> None:
 
 def test_irregular_motion_is_told_as_a_zone_and_not_refined_to_the_finest() -> None:
     curve = curve_of(SETTLED, irregular_zone)
-    zone = next(jump for jump in curve.jumps if jump.why is Why.IRREGULAR)
-    assert zone.results == ("max",)
+    assert not any(jump.why is Why.IRREGULAR for jump in curve.jumps)
+    (zone,) = curve.stretches
+    assert [*zone.half_widths] == ["max"]
     assert zone.low == pytest.approx(0.5, abs=1.6 / 64)
     assert zone.high == pytest.approx(0.9, abs=1.6 / 64)
     inner = curve.x[(curve.x > 0.55) & (curve.x < 0.85)]
     assert len(inner) < 0.3 / (1.6 / 256) / 2
     assert curve.joined["mean"].all()
-    assert not curve.joined["max"][(curve.x[:-1] >= zone.low) & (curve.x[:-1] < zone.high)].any()
+    assert not curve.scattered["mean"].any()
+    within = (curve.x[:-1] >= zone.low) & (curve.x[:-1] < zone.high)
+    assert (curve.scattered["max"] == within).all()
+    assert curve.joined["max"][within].all()
+    # Beside it there is the jump from periodic motion.
+    assert {jump.high for jump in curve.jumps if jump.high <= 0.6} == {zone.low}
+    assert {jump.low for jump in curve.jumps if jump.low >= 0.8} == {zone.high}
+    assert np.isfinite(curve.half_widths["max"]).sum() == within.sum() + 1
+    assert zone.half_widths["max"] == np.nanmax(curve.half_widths["max"])
+    assert curve_of(SETTLED, irregular_zone).to_json()["irregular"] == [zone.to_json()]
+
+
+def logistic(points: Floats) -> dict[str, Floats]:
+    """The logistic map at rates from 3.5 to 3.98: chaos, broken by windows of periodic motion."""
+    rate = 3.5 + 0.3 * points[:, -1]
+    orbit = np.empty((1536, len(rate)))
+    orbit[0] = 0.4
+    for step in range(1, len(orbit)):
+        orbit[step] = rate * orbit[step - 1] * (1.0 - orbit[step - 1])
+    orbit = orbit[512:]
+    same = np.abs(orbit[1:65] - orbit[0]) < 1e-6
+    periodic = same.any(axis=0)
+    error = orbit.reshape(32, 32, -1).mean(axis=1).std(axis=0, ddof=1) / np.sqrt(32.0)
+    more = {
+        "regime": np.where(periodic, 1.0, IRREGULAR),
+        "regime.order": np.where(periodic, 1.0 + same.argmax(axis=0), np.nan),
+        "mean.half_width": np.where(periodic, np.nan, 2.04 * error),
+    }
+    return settled(points[:, -1], orbit.mean(axis=0), orbit.max(axis=0), **more)
+
+
+@pytest.mark.parametrize("name", ["mean", "max"])
+def test_results_lie_within_the_band_around_the_lines_of_irregular_motion(name: str) -> None:
+    curve = curve_of(replace(SETTLED, error=0.005), logistic)
+    draws = np.random.default_rng(2)
+    parts = np.flatnonzero(curve.scattered[name])
+    steps = np.diff(curve.x)
+    assert steps[parts].sum() > 0.6 * 1.6
+    part = draws.choice(parts, size=1000, p=steps[parts] / steps[parts].sum())
+    x = curve.x[part] + draws.uniform(size=1000) * steps[part]
+    rows = logistic(x[:, None])
+    assert 0.02 < (rows["regime"] != IRREGULAR).mean() < 0.2  # in windows
+    band = np.interp(x, curve.x, np.nan_to_num(curve.half_widths[name]))
+    inside = np.abs(rows[name] - np.interp(x, curve.x, curve.values[name])) <= band
+    assert 0.9 <= inside.mean() <= 0.99
+
+
+def test_a_stretch_ends_at_a_case_without_a_result() -> None:
+    def function(points: Floats) -> dict[str, Floats]:
+        x = points[:, -1]
+        own = logistic(points)
+        return own | {"mean": np.where(np.abs(x - 0.9001) < 1e-9, np.nan, own["mean"])}
+
+    plan = replace(SETTLED, error=0.005, adaptive=(replace(LOAD, include=(0.9001,)),))
+    curve = curve_of(plan, function)
+    place = np.searchsorted(curve.x, 0.9001 - 1e-9)
+    assert not curve.joined["mean"][place - 1 : place + 1].any()
+    assert not curve.scattered["mean"][place - 1 : place + 1].any()
+    assert any(jump.low < 0.9001 < jump.high for jump in curve.jumps)
+    assert all(np.isfinite([*zone.half_widths.values()]).all() for zone in curve.stretches)
+
+
+def test_the_half_width_of_a_stretch_is_that_of_two_means_and_of_their_scatter() -> None:
+    def function(points: Floats) -> dict[str, Floats]:
+        x = points[:, -1]
+        own = settled(x, x, np.where(np.abs(x - 0.8) < 1e-9, 0.5, 0.0))
+        return own | {"regime": np.full(len(x), IRREGULAR), "mean.half_width": np.full(len(x), 0.02)}
+
+    curve = curve_of(SETTLED, function)
+    np.testing.assert_allclose(curve.half_widths["mean"], np.sqrt(2.0) * 0.02)
+    place = np.searchsorted(curve.x, 0.8)
+    spike = np.zeros(len(curve.x))
+    spike[place - 6 : place + 7] = 0.5
+    spike[[place - 7, place + 7]] = 0.25  # near points that are half as far off
+    np.testing.assert_allclose(curve.half_widths["max"], spike)
 
 
 def test_a_mean_that_is_not_known_to_the_error_is_told() -> None:
     curve = curve_of(replace(SETTLED, error=0.002), irregular_zone)
-    assert any(set(jump.results) == {"mean", "max"} for jump in curve.jumps if jump.why is Why.IRREGULAR)
+    assert any([*zone.half_widths] == ["mean", "max"] for zone in curve.stretches)
 
 
 def test_a_zone_of_irregular_motion_is_told_where_a_result_scatters_in_a_part_of_it() -> None:
@@ -89,8 +165,9 @@ def test_a_zone_of_irregular_motion_is_told_where_a_result_scatters_in_a_part_of
         return own | {"max": 2.0 - x + np.where((x > 0.65) & (x < 0.75), 0.15 * noise(x), 0.0)}
 
     curve = curve_of(SETTLED, function)
-    (zone,) = curve.jumps
-    assert (zone.why, zone.results) == (Why.IRREGULAR, ("max",))
+    assert not curve.jumps
+    (zone,) = curve.stretches
+    assert [*zone.half_widths] == ["max"]
     assert (zone.low, zone.high) == pytest.approx((0.5, 0.9), abs=1.6 / 128)
 
 
@@ -101,10 +178,11 @@ def test_irregular_motion_is_reported_however_smooth_it_is() -> None:
         return own | {"regime": np.full(len(x), IRREGULAR), "mean.half_width": np.full(len(x), 0.02)}
 
     wide = curve_of(SETTLED, function)
-    assert [(jump.low, jump.high, jump.results) for jump in wide.jumps] == [(0.0, 1.6, ("mean", "max"))]
+    assert [(zone.low, zone.high, [*zone.half_widths]) for zone in wide.stretches] == [(0.0, 1.6, ["mean", "max"])]
     # Of a mean the half width says how far it scatters, of an extreme nothing does.
     narrow = curve_of(replace(SETTLED, error=0.05), function)
-    assert [(jump.low, jump.high, jump.results) for jump in narrow.jumps] == [(0.0, 1.6, ("max",))]
+    assert [(zone.low, zone.high, [*zone.half_widths]) for zone in narrow.stretches] == [(0.0, 1.6, ["max"])]
+    assert not wide.jumps
 
 
 def settling(x: Floats, periods: Floats, multiplier: Floats) -> dict[str, Floats]:
