@@ -17,11 +17,13 @@ from sprag_study.engine.endings import ENDINGS, Ending
 from sprag_study.engine.outcome import Trajectory
 from sprag_study.engine.run import SettledRun, Span
 from sprag_study.engine.vibration_drive.cases import (
+    STOPS,
     Column,
     case_matrix,
     default_of,
     pendulum_count,
     scalars,
+    stop_column,
     with_lengths,
 )
 from sprag_study.engine.vibration_drive.characteristics import characteristics, combined
@@ -79,7 +81,9 @@ class _Stretch:
 
 def _stretches(ramps: Ramps, frequency: float) -> list[_Stretch]:
     """The stretches of a start-up; the last one, without a ramp, is as long as is computed at most."""
-    rise, loaded = ramps.frequency_time, ramps.load_time
+    # A ramp from the final frequency is none.
+    rise = ramps.frequency_time if ramps.start_frequency != frequency else 0.0
+    loaded = ramps.load_time
     frequency_rate = (frequency - ramps.start_frequency) / rise if rise else 0.0
     factor_rate = 1.0 / loaded if loaded else 0.0
     turns, stretches = 0.0, []
@@ -150,7 +154,9 @@ class _Drive:
         begin = float(rows[0, BEGIN])
         matrix = with_lengths(matrix, rows[:, BEGIN], np.array([clock]), windowed=True)
         passed = times - stretch.start
-        places = np.minimum(begin + passed * self.frequency, begin + clock)
+        # A run that ends a rounding error beside a whole period ends there.
+        last = float(np.sum(matrix[0, stop_column(STOPS - 1) : stop_column(STOPS)]))
+        places = np.minimum(begin + passed * self.frequency, last)
         module = kernel_of(values, run.tolerance, ramped=stretch.ramped)
         found = integrate(module, matrix, run, starts=rows, strobes=1, times=places)
         passed = passed[: found.recorded]

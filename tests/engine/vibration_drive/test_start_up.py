@@ -89,7 +89,7 @@ def compare(columns: Columns, ramps: Ramps, count: int) -> None:
     expected = np.array(reference.values)
     columns_of = [seen.motion.names.index(name) for name in ("pendulums.0.angle", "pendulums.0.speed", "shaft.speed")]
     both = seen.motion.values[:, columns_of], expected[:, [0, 1, machine.shaft]]
-    assert np.max(np.abs(both[0] - both[1]), axis=0) == pytest.approx(np.zeros(3), abs=2e-7)
+    assert np.max(np.abs(both[0] - both[1]), axis=0) == pytest.approx(np.zeros(3), abs=1e-8)
     results = course.characteristics(seen.sums, float(times[-1]))
     for name, value in reference.mean.items():
         assert results[name] == pytest.approx(value, rel=1e-7, abs=1e-9), name
@@ -118,6 +118,14 @@ def test_without_a_ramp_it_is_the_run_bit_for_bit() -> None:
     assert np.array_equal(motion.values[:, 2:], plain.values)
     assert motion.states == plain.states
     assert np.all(motion.values[:, :2] == [20.0, 1.0])
+
+
+@pytest.mark.parametrize("ramps", [Ramps(0.51, 20.0), *(Ramps(0.05 * k, 0.0, 0.35) for k in range(1, 12, 2))])
+def test_every_time_is_met_whatever_the_ends_of_the_ramps_are(ramps: Ramps) -> None:
+    times = np.arange(25) / 20.0
+    motion = _Drive(drive(), ramps, SETTINGS, None).run(times[-1], times).motion
+    assert motion.times.tolist() == times.tolist()
+    assert np.all(np.diff(motion.values[:, motion.names.index("shaft.angle")]) >= 0.0)
 
 
 def test_it_ends_where_the_mean_speed_of_each_turn_stays_at_the_settled_one() -> None:
@@ -161,5 +169,6 @@ def test_through_the_resonance_of_a_pendulum_as_scipy_goes() -> None:
     expected = np.concatenate(seen)
     angle = _Drive(columns, Ramps(ramp, 4.0), SETTINGS, None).run(times[-1], times).motion
     values = angle.values[:, angle.names.index("pendulums.0.angle")]
-    assert np.max(np.abs(expected)) == pytest.approx(0.0094, rel=0.3)
+    forced = 0.015 * 1e-4 * nu**2 / abs(22.5 - 0.015 * 9.80665 - 1e-3 * nu**2)
+    assert np.max(np.abs(expected)) > 2.5 * forced
     assert np.max(np.abs(values - expected)) < 1e-8 * np.max(np.abs(expected))
