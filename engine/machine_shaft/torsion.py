@@ -63,7 +63,7 @@ class Signals(NamedTuple):
     acceleration: Floats
 
 
-class Train(NamedTuple):
+class CaseChain(NamedTuple):
     """The train of one case: inertias (m + 1,) in kg*m^2, stiffness (m,) in N*m/rad, and relative damping (m,)."""
 
     inertias: Floats
@@ -71,7 +71,7 @@ class Train(NamedTuple):
     damping: Floats
 
 
-class Answer(NamedTuple):
+class Vibration(NamedTuple):
     """Torques in the couplings of one case, reduced to the main shaft.
 
     Attributes
@@ -126,7 +126,7 @@ def torsion_results(
             2.0 * np.pi / period[case] * times[case][real], half[:, None] / period[case] * pace[case][real],
             d.drive.torque[case][real], acceleration[case][real],
         )  # fmt: skip
-        train = Train(inertias[case], stiffness[case], damping[case])
+        train = CaseChain(inertias[case], stiffness[case], damping[case])
         answer = answered(train, signals, 2.0 * np.pi / period[case], round(d.cycle / (2.0 * np.pi)))
         passed = efficiencies[case] if answer.mean >= 0.0 else 1.0 / efficiencies[case]
         own = _of_case(answer, 2.0 * np.pi / period[case], rigid[case], 1.0 / (ratios[case] * passed))
@@ -139,7 +139,7 @@ def _row(values: Floats, cases: int) -> Floats:
     return np.broadcast_to(values[:, 0, 0], (cases,))
 
 
-def _of_case(answer: Answer, pace: float, rigid: Floats, own_shaft: Floats) -> dict[str, float]:
+def _of_case(answer: Vibration, pace: float, rigid: Floats, own_shaft: Floats) -> dict[str, float]:
     """Results of one case: ``rigid`` are the largest torques with a rigid train, ``own_shaft`` the factors by which
     torques are those of the coupling's own shaft.
     """
@@ -170,12 +170,12 @@ def _of_case(answer: Answer, pace: float, rigid: Floats, own_shaft: Floats) -> d
     return out
 
 
-def answered(train: Train, signals: Signals, pace: float, turns: int) -> Answer:
+def answered(train: CaseChain, signals: Signals, pace: float, turns: int) -> Vibration:
     """The steady answer of one train.
 
     Parameters
     ----------
-    train : Train
+    train : CaseChain
     signals : Signals
     pace : float
         Angular frequency of the cycle in rad/s.
@@ -203,7 +203,7 @@ def answered(train: Train, signals: Signals, pace: float, turns: int) -> Answer:
     places = 2.0 * np.pi / (_PLACES * orders) * np.arange(_PLACES * orders)
     ends = np.empty((couplings, 2))
     _extremes(mean, elastic, elementary.cos(places), elementary.sin(places), ends)
-    return Answer(natural, mean, rigid, elastic, ends)
+    return Vibration(natural, mean, rigid, elastic, ends)
 
 
 @lru_cache(maxsize=64)

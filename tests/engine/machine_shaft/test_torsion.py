@@ -16,7 +16,7 @@ from sprag_study.engine.machine_shaft.load_results import infos_of
 from sprag_study.engine.machine_shaft.panels import Panels
 from sprag_study.engine.machine_shaft.simulate import simulate
 from sprag_study.engine.machine_shaft.spec import Drive, MachineSpec, MechanismChoice, OperationChoice
-from sprag_study.engine.machine_shaft.torsion import Answer, Signals, Train, answered, natural_frequencies
+from sprag_study.engine.machine_shaft.torsion import CaseChain, Signals, Vibration, answered, natural_frequencies
 from tests.engine.machine_shaft.machines import NAMES, PRESS, PRESS_NUMBERS, one
 
 Floats = NDArray[np.float64]
@@ -29,7 +29,7 @@ def frequencies(inertias: list[float] | Floats, stiffness: list[float] | Floats)
     return out
 
 
-def matrices(train: Train) -> tuple[Floats, Any]:
+def matrices(train: CaseChain) -> tuple[Floats, Any]:
     """Inertias and complex stiffness of the angles of the bodies."""
     count = len(train.inertias)
     joined: Any = np.zeros((count, count), dtype=complex)
@@ -47,12 +47,12 @@ def test_natural_frequencies_are_those_of_holzer_s_tables() -> None:
     rng = np.random.default_rng(3)
     for count in range(2, 17):
         inertias, stiffness = 10.0 ** rng.uniform(-3, 2, count), 10.0 ** rng.uniform(1, 6, count - 1)
-        masses, joined = matrices(Train(inertias, stiffness, np.zeros(count - 1)))
+        masses, joined = matrices(CaseChain(inertias, stiffness, np.zeros(count - 1)))
         squares = eigh(joined.real, masses, eigvals_only=True)[1:]
         assert np.square(frequencies(inertias, stiffness)) == pytest.approx(squares, rel=1e-9, abs=1e-10 * squares[-1])
 
 
-def answer_to(train: Train, pace: float, drive: Floats, load: Floats, count: int = 16) -> Answer:
+def answer_to(train: CaseChain, pace: float, drive: Floats, load: Floats, count: int = 16) -> Vibration:
     """The answer to torques on the first and on the last body, rows of order, cos and sin, with that many panels."""
     panels = Panels.over(2.0 * math.pi, [], count)
     unit = panels.angles[0]
@@ -65,8 +65,8 @@ def answer_to(train: Train, pace: float, drive: Floats, load: Floats, count: int
     return answered(train, Signals(unit, weights, course(drive), acceleration), pace, 1)
 
 
-def random_train(rng: np.random.Generator, couplings: int) -> Train:
-    return Train(
+def random_train(rng: np.random.Generator, couplings: int) -> CaseChain:
+    return CaseChain(
         10.0 ** rng.uniform(-1, 1, couplings + 1), 10.0 ** rng.uniform(2, 4, couplings),
         rng.uniform(0.1, 1.5, couplings),
     )  # fmt: skip
@@ -95,7 +95,7 @@ def test_harmonics_are_those_of_the_equations_of_the_angles_and_their_power_is_d
 
 
 def test_a_single_harmonic_above_the_first_ones_is_seen() -> None:
-    train, pace = Train(np.array([1.0, 2.0]), np.array([3e5]), np.array([0.1])), 5.0
+    train, pace = CaseChain(np.array([1.0, 2.0]), np.array([3e5]), np.array([0.1])), 5.0
     order = 130
     answer = answer_to(train, pace, np.array([[0, 6.0, 0.0]]), np.array([[0, -6.0, 0.0], [order, 9.0, 0.0]]), 160)
     masses, joined = matrices(train)
@@ -106,7 +106,7 @@ def test_a_single_harmonic_above_the_first_ones_is_seen() -> None:
 
 def test_the_peak_is_that_of_a_long_integration_from_rest() -> None:
     # Of one harmonic, a relative damping is a viscous one: c = psi k/(2 pi w).
-    train, pace, order = Train(np.array([0.4, 0.2, 1.5]), np.array([900.0, 1400.0]), np.array([1.2, 0.9])), 11.0, 3
+    train, pace, order = CaseChain(np.array([0.4, 0.2, 1.5]), np.array([900.0, 1400.0]), np.array([1.2, 0.9])), 11.0, 3
     answer = answer_to(train, pace, np.array([[0, 6.0, 0.0]]), np.array([[0, -6.0, 0.0], [order, 5.0, 2.0]]))
     joined = matrices(train)[1]
     viscous = joined.imag / (order * pace)
