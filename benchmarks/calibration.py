@@ -1,16 +1,19 @@
 """Do the intervals of calibrations hold the true values? Synthetic measurements of drives, with noise.
 
     python -m benchmarks.calibration [--sets COUNT] [--first SET] [--refits COUNT] [--settled] [--unknown-sigma]
+        [--priors]
 
 Each set is a drive of W1 with random damping, inertia of the pendulum, rate of its spring and backlash, whose mean
 speed and irregularity are measured with 2 % noise at five loads and three frequencies. By default its rows are those of
-runs over 60 periods.
+runs over 60 periods. With ``--priors`` the rate of the spring is drawn from a normal distribution that the calibration
+knows, and only one frequency is measured.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +44,8 @@ RESULTS = ("shaft.speed.mean", "shaft.irregularity")
 PATHS = ("shaft.load", "excitation.frequency")
 AT = tuple((float(load), hertz) for load in np.linspace(0.05, 0.25, 5) for hertz in (20.0, 24.0, 28.0))
 NOISE = 0.02
+#: Which of the unknowns is drawn from a prior, and that prior.
+RATE, PRIOR = 2, (9_000.0, 300.0)
 _TIMED = Run(Span(60.0), (Span(40.0), Span(60.0)))
 
 
@@ -70,18 +75,23 @@ class Drive:
         return Rows(points, np.asarray(endings) == ENDINGS.index(Ending.OK), named)
 
 
-def one_set(number: int, drive: Drive, refits: int, *, known: bool) -> tuple[Floats, CalibratePlanner]:
+def one_set(number: int, drive: Drive, refits: int, *, known: bool, prior: bool) -> tuple[Floats, CalibratePlanner]:
     """The true values of a set, and its calibration at the end."""
     random = np.random.default_rng(number)
     true = np.array([random.uniform(*ends) for ends in TRUE])
-    exact = drive.rows(np.hstack([np.tile(true, (len(AT), 1)), np.array(AT)]))
+    at, unknown = AT, UNKNOWN
+    if prior:
+        true[RATE] = random.normal(*PRIOR)
+        at = tuple(one for one in AT if one[1] == AT[1][1])
+        unknown = tuple(replace(one, prior=PRIOR if place == RATE else None) for place, one in enumerate(UNKNOWN))
+    exact = drive.rows(np.hstack([np.tile(true, (len(at), 1)), np.array(at)]))
     measured = []
     for name in RESULTS:
         sigma = NOISE * np.abs(exact.values[name])
-        values = exact.values[name] + sigma * random.normal(size=len(AT))
+        values = exact.values[name] + sigma * random.normal(size=len(at))
         deviations = tuple(sigma.tolist()) if known else ()
-        measured.append(Measured(name, tuple(range(len(AT))), tuple(values.tolist()), deviations))
-    planner = CalibratePlanner(CalibratePlan(UNKNOWN, PATHS, AT, tuple(measured), refits=refits, seed=number))
+        measured.append(Measured(name, tuple(range(len(at))), tuple(values.tolist()), deviations))
+    planner = CalibratePlanner(CalibratePlan(unknown, PATHS, at, tuple(measured), refits=refits, seed=number))
     while len(points := planner.ask().points):
         planner.tell(drive.rows(points))
     return true, planner
@@ -95,12 +105,13 @@ def main() -> None:
     parser.add_argument("--refits", type=int, default=200)
     parser.add_argument("--settled", action="store_true")
     parser.add_argument("--unknown-sigma", action="store_true")
+    parser.add_argument("--priors", action="store_true")
     chosen = parser.parse_args()
     drive = Drive(settled=chosen.settled)
     held, named, planning = np.zeros(len(UNKNOWN), dtype=np.int64), 0, 0.0
     for number in range(chosen.first, chosen.first + chosen.sets):
         begin, engine = time.process_time(), drive.seconds
-        true, planner = one_set(number, drive, chosen.refits, known=not chosen.unknown_sigma)
+        true, planner = one_set(number, drive, chosen.refits, known=not chosen.unknown_sigma, prior=chosen.priors)
         planning += time.process_time() - begin - (drive.seconds - engine)
         found = answer(planner.plan, planner.space, planner.state)
         if found is None or found.intervals is None:

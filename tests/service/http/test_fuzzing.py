@@ -28,13 +28,13 @@ HEAVY = {
         ("create_study", "preview_study", "extend_study", "create_schedule", "change_schedule"), ("coverage",)
     ),
     "get_report": ("examples", "coverage"),
-    # Their questions are read by the code that reads those of `get_curves`; `get_audit` is asked about times as
-    # `list_studies` is.
+    # Their questions are read by the code that reads those of `get_results` and `list_cases`; `get_audit` is asked
+    # about times as `list_studies` is.
     **dict.fromkeys(
         (
             *("get_transient", "get_forces", "get_basin", "get_trajectory", "get_section", "get_branch", "get_strobes"),
             *("get_duty", "get_engagements", "get_yield", "get_exploration", "get_ribbon", "get_answers", "get_front"),
-            *("get_map", "get_sensitivity", "get_calibration", "get_speeds", "get_diagram", "get_audit"),
+            *("get_curves", "get_map", "get_sensitivity", "get_calibration", "get_speeds", "get_diagram", "get_audit"),
             "get_startup",
         ),
         ("coverage",),
