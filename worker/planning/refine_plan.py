@@ -53,7 +53,7 @@ class AdaptiveAxis:
         """Values at positions: on the grid those of ``numpy.linspace`` with any power of two of intervals."""
         values = self.low + (self.high - self.low) * positions / finest
         values = np.where(positions == finest, self.high, values)
-        beside = self.beside(finest)
+        beside = self.beside(finest) if self.include else np.zeros(0)
         return (
             np.where(positions > finest, beside[np.maximum(positions - finest - 1, 0)], values)
             if beside.size

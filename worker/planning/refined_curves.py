@@ -244,6 +244,8 @@ def _half_widths(x: Floats, values: Floats, own: Floats, scattered: Bools) -> Fl
     A mean beside the line differs from it by its own half width and by that of the line, which is at most as large.
     Where points nearby are further from the line between their neighbours, the largest of these distances counts.
     """
+    if not scattered.any():
+        return np.full(len(x), np.nan)
     before, after = np.append(False, scattered), np.append(scattered, False)
     part = np.cumsum(after & ~before)
     member, inner = before | after, np.flatnonzero(before & after)
