@@ -86,6 +86,9 @@ _SUPERSCRIPTS: Final = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "01234567
 _SIGNS: Final = str.maketrans("\u2212\u2013·⋅×\u2219μ\u00a0\u202f\u2009", "--****µ   ")
 
 
+_ACCELERATION: Final = "m/s^2"
+
+
 class QuantityError(ClauseError):
     """A value that is not a quantity of the expected unit."""
 
@@ -324,6 +327,14 @@ def is_unit(name: str) -> bool:
     return True
 
 
+def is_known_unit(text: str) -> bool:
+    """Whether a text, such as "mm/s", is a unit of any quantity; an empty one is none."""
+    try:
+        return bool(measure(text)) if text else False
+    except QuantityError:
+        return False
+
+
 def load() -> None:
     """Load pint now; otherwise the first quantity with a unit loads it. For processes that do nothing else with pint.
 
@@ -368,8 +379,21 @@ def _factor(text: str, unit: str) -> Fraction:
             return factor / wanted_factor * Fraction(TWO_PI)  # min^-1 of nameplates are revolutions
         if unit == "N*m*s/rad" and angle == 0:
             return factor / wanted_factor  # N*m*s, the usual notation in textbooks
+    raise wrong_unit(text, unit)
+
+
+def wrong_unit(text: str, unit: str, other: str = "") -> QuantityError:
+    """The error about a known unit that is not one of the SI ``unit``, nor of an ``other`` that would do too."""
+    expected = Sentence("expected {unit}, for example {example}", unit=Typed(unit), example=example(unit))
+    if other:
+        expected = Sentence(
+            "{expected}, or {other}, for example {example}",
+            expected=expected, other=Typed(other), example=example(other),
+        )  # fmt: skip
+    if _ACCELERATION in (unit, other) and _measure(text)[1] == {"gram": 1}:
+        expected = Sentence("{expected}; g is the gram, and the acceleration of free fall g_0", expected=expected)
     message = Sentence("is in '{unit}', which is not a unit of this field; {expected}", unit=text, expected=expected)
-    raise QuantityError("wrong-unit", message)
+    return QuantityError("wrong-unit", message)
 
 
 def _measure(text: str) -> tuple[Fraction, dict[str, int]]:

@@ -63,14 +63,14 @@ def doubts(found: Calibration) -> list[str]:
 
 def _doubts(found: Calibration, known: Answer) -> Iterator[str]:
     """Whether the model fits, and what in the measurement may be wrong."""
-    yield from _fits(found)
+    yield from _fits(found, known)
     yield from _chi_square(found, known)
     yield from _against_priors(found, known)
     yield from _shifted(found)
     yield from _points(found, known)
 
 
-def _fits(found: Calibration) -> Iterator[Phrase]:
+def _fits(found: Calibration, known: Answer) -> Iterator[Phrase]:
     """Whether the residuals are chance, where no sigma says how large they may be."""
     if found.plan.known_sigma:
         return
@@ -85,12 +85,11 @@ def _fits(found: Calibration) -> Iterator[Phrase]:
     if test.test == "runs":
         values |= {"runs": round(test.statistic), "total": round(sum(test.freedom))}
         if test.p < CHANCE:
-            yield Phrase(
+            yield _with_narrow(known, Phrase(
                 "The {total} residuals of {name} keep their sign too long for chance ({runs} runs, p = {p}): the model "
-                "lacks something, or a value of the base is wrong, and the intervals are too narrow; free a further "
-                "parameter, or correct the base.",
+                "lacks something, or a value of the base is wrong; free a further parameter, or correct the base.",
                 **values,
-            )
+            ))  # fmt: skip
         else:
             yield Phrase(
                 "The {total} residuals of {name} change their sign as by chance ({runs} runs, p = {p}): no lack of fit "
@@ -100,12 +99,11 @@ def _fits(found: Calibration) -> Iterator[Phrase]:
         return
     values["ratio"] = Amount(test.statistic, "1", 3, form=".3g")
     if test.p < CHANCE:
-        yield Phrase(
+        yield _with_narrow(known, Phrase(
             "The fit misses {name} by more than repeated points scatter (F = {ratio}, p = {p}): the model lacks "
-            "something, or a value of the base is wrong, and the intervals are too narrow; free a further parameter, "
-            "or correct the base.",
+            "something, or a value of the base is wrong; free a further parameter, or correct the base.",
             **values,
-        )
+        ))  # fmt: skip
     else:
         yield Phrase(
             "The fit misses {name} by no more than repeated points scatter (F = {ratio}, p = {p}): no lack of fit "
@@ -229,11 +227,10 @@ def _chi_square(found: Calibration, known: Answer) -> Iterator[Phrase]:
         return
     above = _chi_square_above(known.chi_square, known.freedom)
     if above < _CHANCE:
-        yield Phrase(
-            "Chi-square is {value} for {freedom} degrees of freedom: the points are farther off than sigma explains; "
-            "the intervals are too narrow.",
+        yield _with_narrow(known, Phrase(
+            "Chi-square is {value} for {freedom} degrees of freedom: the points are farther off than sigma explains.",
             **values,
-        )
+        ))  # fmt: skip
     elif above > 1.0 - _CHANCE:
         yield Phrase(
             "Chi-square is {value} for {freedom} degrees of freedom: the points scatter less than sigma; the intervals "
@@ -244,6 +241,20 @@ def _chi_square(found: Calibration, known: Answer) -> Iterator[Phrase]:
         yield Phrase(
             "Chi-square is {value} for {freedom} degrees of freedom: the points scatter as sigma says.", **values
         )
+
+
+def _with_narrow(known: Answer, text: Phrase) -> Phrase:
+    """A sentence, and what follows from it for the intervals that are not their whole ranges."""
+    bounds = known.at_bounds
+    whole = [] if bounds is None else [bool(low and high) for low, high in bounds]
+    if whole and all(whole):
+        return text
+    narrow = (
+        Phrase("The intervals that end within their ranges are too narrow.")
+        if any(whole)
+        else Phrase("The intervals are too narrow.")
+    )
+    return joined(" ", [text, narrow])
 
 
 def _chi_square_above(value: float, freedom: int) -> float:

@@ -22,7 +22,7 @@ from sprag_study.service.reading.printed import could_be_several, could_be_value
 from sprag_study.service.reading.together import AMBIGUOUS_UNIT, questions
 from sprag_study.service.reading.unit_names import CURRENCIES
 from sprag_study.service.reading.units import QuantityError, has_unit, split_quantity, to_float
-from sprag_study.service.spec.csv_text import Column, in_cell, read_csv, refuse_mixed_column, unescape
+from sprag_study.service.spec.csv_text import Column, read_csv, refuse_in, refuse_mixed_column, unescape
 from sprag_study.service.spec.described import Record
 from sprag_study.service.spec.labels import LINES_ALLOWED, printable_lines
 from sprag_study.service.spec.node import Node, exact
@@ -322,8 +322,7 @@ def _read_csv(node: Node) -> list[tuple[str, Component]]:
         fields = {name: cell for name, cell in cells.items() if name not in COLUMNS}
         one = _checked(Node(line, "", cells), Node(line, "", fields))
         for fault in line.faults:
-            message = in_cell(row.line, fault.message, (fault.where or "").strip("/"))
-            node.refuse(fault.code, message, fault.value, allowed=fault.allowed, unit=fault.unit)
+            refuse_in(node, row.line, (fault.where or "").strip("/"), fault)
         made += [(f"/csv line {row.line}", one)] if one is not None else []
     return made
 

@@ -8,9 +8,11 @@ from __future__ import annotations
 import csv
 import math
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from sprag_study.sentences import Sentence, joined, plural
+from sprag_study.service.faults import Fault
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.catalogue import range_sentence
 from sprag_study.service.reading.limits import at_most
@@ -39,6 +41,12 @@ _OF_CSV: Final = (
 _WITH_UNIT: Final = re.compile(r"[0-9.]\s*(?:[^\W\d_eE]|[eE](?![-+0-9])|[^\w\s.,;+-])")
 
 
+#: The part of a message that is about the first of several lines; lines that it lists, and the sign for others.
+_FIRST: Final = "first"
+_LISTED: Final = 3
+_MORE: Final = ", …"
+
+
 def escape(text: str) -> str:
     """Escape text that a spreadsheet would interpret as a formula with an apostrophe; `unescape` is the inverse."""
     return "'" + text if text.lstrip("'").startswith(_FORMULA_STARTS) else text
@@ -65,13 +73,16 @@ def read_csv(node: Node, most: tuple[int, int], example: str, texts: Collection[
         node.refuse("unreadable", not_csv(error), None)
         return None
     rows = with_units(table.rows)
-    columns = len(rows[0].cells) if rows else 0
+    if not rows:
+        node.refuse("out-of-range", "is empty", None, allowed=example)
+        return None
+    columns = len(rows[0].cells)
     if not 2 <= len(rows) <= most[0] + 1 or not 1 <= columns <= most[1]:
         size = {"lines": str(len(rows) - 1), "columns": str(columns)}
         under = Sentence("has {lines} lines of {columns} columns under its headings", **size)
         node.refuse(
             "out-of-range",
-            "is empty" if not rows else "has no lines under its headings" if len(rows) == 1 else under,
+            "has no lines under its headings" if len(rows) == 1 else under,
             None,
             allowed=Sentence("1 to {lines} lines of 1 to {columns} columns", lines=most[0], columns=most[1]),
         )
@@ -85,18 +96,17 @@ def read_csv(node: Node, most: tuple[int, int], example: str, texts: Collection[
                 len(cell), place=str(place),
             )  # fmt: skip
             node.refuse("out-of-range", message, None, allowed=at_most(MAX_HEADING))
-    for row in rows[1:]:
-        if len(row.cells) != columns:
-            message = plural(
-                "line {line} has {count} cell", "line {line} has {count} cells", len(row.cells), line=str(row.line)
-            )
-            allowed = plural("{count} cell", "{count} cells", columns)
-            if len(row.cells) > columns:
-                hint = Sentence("with decimal commas, columns are separated by semicolons")
-                allowed = joined("; ", (allowed, hint))
-            node.refuse("unequal-lengths", message, None, allowed=allowed)
-        if node.report.full:
-            break
+    uneven = [row for row in rows[1:] if len(row.cells) != columns]
+    if uneven:
+        line, cells = uneven[0]
+        message = plural("line {line} has {count} cell", "line {line} has {count} cells", len(cells), line=str(line))
+        for row in uneven[1:]:
+            message = with_further(message, row.line)
+        allowed = plural("{count} cell", "{count} cells", columns)
+        if any(len(row.cells) > columns for row in uneven):
+            hint = Sentence("with decimal commas, columns are separated by semicolons")
+            allowed = joined("; ", (allowed, hint))
+        node.refuse("unequal-lengths", message, None, allowed=allowed)
     return None if node.report.found > before else _settled(node, table._replace(rows=rows), texts)
 
 
@@ -152,8 +162,6 @@ def read_columns(node: Node, rows: Sequence[CsvRow], columns: Sequence[tuple[Col
             except QuantityError as error:
                 refuse_cell(node, row, column, error, range_sentence(parameter), parameter.unit)
                 read.append(math.nan)
-        if node.report.full:
-            break
     return values
 
 
@@ -161,8 +169,39 @@ def refuse_cell(node: Node, row: CsvRow, column: Column, error: QuantityError, a
     """Record a fault of a cell, which is shown with the unit of its column."""
     cell = column.cell(row)
     written = f"{cell} {column.unit}" if column.unit and parse_number(cell) is not None else cell
-    message = in_cell(row.line, error.message, shorten_text(str(column)))
-    node.refuse(error.code, message, written, allowed=allowed, unit=unit)
+    refuse_in(node, row.line, shorten_text(str(column)), Fault(None, error.code, error.message, written, allowed, unit))
+
+
+def refuse_in(node: Node, line: int, column: str, fault: Fault) -> None:
+    """Record a fault of a cell of the table ``node``; a further one of its column and code with the first."""
+    report = node.report
+    for place, known in enumerate(report.faults):
+        parts = _first(known.message).parts
+        alike = "line" in parts and parts.get("column", "") == column
+        if alike and (known.where, known.code) == (node.pointer, fault.code):
+            report.found += 1
+            report.faults[place] = replace(known, message=with_further(known.message, line))
+            return
+    node.refuse(fault.code, in_cell(line, fault.message, column), fault.value, allowed=fault.allowed, unit=fault.unit)
+
+
+def with_further(message: str, line: int) -> Sentence:
+    """A message about a cell or a line, and that a further ``line`` has the same fault."""
+    known = message.parts if isinstance(message, Sentence) and _FIRST in message.parts else {}
+    count, lines = int(str(known.get("count", 0))) + 1, str(known.get("lines", ""))
+    listed = (
+        str(line) if not lines else f"{lines}, {line}" if count <= _LISTED else f"{lines.removesuffix(_MORE)}{_MORE}"
+    )
+    return plural("{first} (and {count} further like it, in line {lines})",
+                  "{first} (and {count} further like it, in the lines {lines})",
+                  count, first=_first(message), lines=listed)  # fmt: skip
+
+
+def _first(message: str) -> Sentence:
+    """A message without what it says about further lines."""
+    sentence = message if isinstance(message, Sentence) else Sentence(message)
+    first = sentence.parts.get(_FIRST, sentence)
+    return first if isinstance(first, Sentence) else sentence
 
 
 def refuse_mixed_column(node: Node, rows: Sequence[CsvRow], column: Column, unit: str) -> bool:

@@ -8,11 +8,10 @@ taken as rad and N*m, with a warning; other headers are refused. Empty lines and
 from __future__ import annotations
 
 import csv
-import itertools
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 
@@ -24,13 +23,11 @@ from sprag_study.service.faults import Fault, FaultError
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.numbers import WITHOUT_DOUBT, assumption, is_ambiguous, of_line, parse_number, question
 from sprag_study.service.reading.units import QuantityError, parse_exact, to_float
-from sprag_study.service.spec.csv_text import not_csv
+from sprag_study.service.spec.csv_text import not_csv, with_further
 from sprag_study.service.spec.table_text import settled_table, with_units
 from sprag_study.service.table_rows import CsvRow, Split, lines_of, split
 from sprag_study.worker.limits import MAX_CLUTCH_ROWS
 
-#: Most faults reported for one file; a file of another kind would have one in every line.
-_MAX_PROBLEMS = 20
 _QUANTITIES = (("angle", "rad"), ("torque", "N*m"))
 _UNITS = {"rad": N_("a unit of rad"), "N*m": N_("a unit of N*m")}
 #: Accepted headings without a unit, by column.
@@ -180,7 +177,7 @@ def _assumed(units: tuple[str | None, str | None], rows: NDArray[np.float64]) ->
 
 def _numbers(table: Split, units: tuple[str | None, str | None]) -> MeasuredData:
     rows, doubt = settled_table(table)
-    problems = list(itertools.islice(_wrong_rows(table, rows), _MAX_PROBLEMS))
+    problems = list(_together(_wrong_rows(table, rows)))
     if doubt is not None and not doubt.likely:
         problems.append(
             Fault(f"line {doubt.line}", "ambiguous-point", question(doubt.text), doubt.text, allowed=WITHOUT_DOUBT)
@@ -212,6 +209,16 @@ def _converted(value: float, size: Fraction | None) -> float:
         return value if size is None else to_float(Fraction(repr(value)) * size)
     except QuantityError:
         return value * float(size or 1)
+
+
+def _together(faults: Iterable[Fault]) -> Iterable[Fault]:
+    """The faults of lines, those that say the same as one."""
+    first: dict[tuple[str, str], Fault] = {}
+    for fault in faults:
+        known = first.get((fault.code, fault.message))
+        further = known and with_further(known.message, int(str(fault.where).removeprefix("line ")))
+        first[fault.code, fault.message] = fault if known is None else replace(known, message=further or "")
+    return first.values()
 
 
 def _wrong_rows(written: Split, rows: Sequence[CsvRow]) -> Iterator[Fault]:

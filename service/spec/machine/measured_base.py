@@ -13,7 +13,7 @@ import numpy as np
 from sprag_study.sentences import Amount, Sentence, plural
 from sprag_study.service.languages import N_
 from sprag_study.service.reading.catalogue import range_sentence
-from sprag_study.service.reading.units import QuantityError, parse_exact, split_quantity
+from sprag_study.service.reading.units import QuantityError, is_known_unit, parse_exact, split_quantity, wrong_unit
 from sprag_study.service.spec.described import Listed, Record
 from sprag_study.service.spec.machine.shaft_tables import read_csv_rows, unit_of_heading
 from sprag_study.service.spec.schema.quantity import QUANTITY
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from sprag_study.service.spec.node import Node
+    from sprag_study.service.table_rows import CsvRow
     from sprag_study.worker.models import Reduction
 
 _TURN: Final = 2.0 * math.pi
@@ -80,6 +81,8 @@ def read_measured_base(node: Node) -> list[list[float]]:
         return []
     data, accuracy = node[form], node["accuracy"].number_or_default(_ACCURACY)
     columns = _columns(data) if form == "csv" else _columns_of_rows(data)
+    if form == "csv" and not _has_units(data, columns):
+        return []
     rows = read_csv_rows(data, *columns) if form == "csv" else _ROWS.read_rows(data, *columns)
     sound = data.sound
     over, measured = columns[0], columns[1:]
@@ -109,10 +112,7 @@ def read_measured_base(node: Node) -> list[list[float]]:
 
 def _columns(node: Node) -> list[Parameter]:
     """What the columns of a CSV text are by their headings and units: angle or time, then x, y or both."""
-    try:
-        rows = split(node.value).rows if isinstance(node.value, str) else []
-    except csv.Error:
-        rows = []  # `read_csv_rows` refuses it
+    rows = _rows_of(node)
     headings = [heading_of(cell) or ("", "") for cell in rows[0].cells] if rows else []
 
     def of_unit(place: int, *ways: Parameter) -> Parameter:
@@ -125,6 +125,27 @@ def _columns(node: Node) -> list[Parameter]:
     axes = ["xy".index(name) for name in named] if named in (["x"], ["y"], ["y", "x"]) else [0, 1]
     kind = max((of_unit(place, *_kinds(0)) is _ACCELERATIONS[0] for place in range(1, len(axes) + 1)), default=False)
     return [over, *(_kinds(axis)[kind] for axis in axes)]
+
+
+def _has_units(node: Node, columns: list[Parameter]) -> bool:
+    """Whether no heading has the unit of another quantity than its column can have; faults say what it can have."""
+    rows, before = _rows_of(node), node.report.found
+    for cell, column in zip(rows[0].cells if rows else (), columns, strict=False):
+        unit = (heading_of(cell) or ("", ""))[1]
+        ways = (_ANGLE, _TIME) if column in (_ANGLE, _TIME) else _kinds(0)
+        if is_known_unit(unit) and not any(_fits(f"1 {unit}", way) for way in ways):
+            error = wrong_unit(unit, *(way.unit for way in ways)).message
+            message = Sentence("the heading of column {column} {error}", column=column.path, error=error)
+            node.refuse("wrong-unit", message, None)
+    return node.report.found == before
+
+
+def _rows_of(node: Node) -> list[CsvRow]:
+    """The rows of a CSV text; none where it is none, which `read_csv_rows` refuses."""
+    try:
+        return split(node.value).rows if isinstance(node.value, str) else []
+    except csv.Error:
+        return []
 
 
 def _axes_of(headings: list[tuple[str, str]]) -> list[str]:

@@ -6,10 +6,11 @@ import re
 from typing import Final
 
 from sprag_study.sentences import Sentence, Typed
+from sprag_study.service.faults import Fault
 from sprag_study.service.reading.catalogue import range_sentence
 from sprag_study.service.reading.numbers import is_ambiguous, parse_number
 from sprag_study.service.reading.units import AmbiguousCommaError, QuantityError, has_unit, parse_exact, to_float
-from sprag_study.service.spec.csv_text import Column, in_cell, read_csv, refuse_mixed_column
+from sprag_study.service.spec.csv_text import Column, read_csv, refuse_in, refuse_mixed_column
 from sprag_study.service.spec.node import Node, exact
 from sprag_study.service.table_rows import heading_of
 from sprag_study.worker.models import Parameter, machine_shaft
@@ -73,8 +74,6 @@ def read_csv_rows(node: Node, *columns: Parameter) -> list[list[float]]:
             for cell, unit, column in zip(row.cells, units, columns, strict=True)
         ]
         found.append([number for number in numbers if number is not None])
-        if node.report.full:
-            break
     return found
 
 
@@ -109,7 +108,6 @@ def _read_cell(node: Node, line: int, cell: str, unit: str, column: Parameter) -
                 "{error}; without a unit in the heading it is in {unit}",
                 error=message, unit=Typed(column.unit),
             )  # fmt: skip
-        node.refuse(
-            error.code, in_cell(line, message, column.path), cell, allowed=range_sentence(column), unit=column.unit
-        )
+        fault = Fault(None, error.code, message, cell, range_sentence(column), column.unit)
+        refuse_in(node, line, column.path, fault)
         return None

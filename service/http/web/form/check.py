@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlencode
 
 from sprag_study.sentences import Place, WarningText
@@ -45,6 +45,10 @@ if TYPE_CHECKING:
 
     Known = Callable[[Study], int]
     Complete = Callable[[Any], Any]
+
+
+#: Faults that are told beside one field; of more of them their number.
+_MOST_TEXTS: Final = 3
 
 
 @dataclass(slots=True)
@@ -230,6 +234,11 @@ def place_faults(form: Filled, found: Iterable[Fault]) -> None:
             # One field can stand for several places of the spec, as the value of a parameter at all points does.
             text = (step_of(item.where or "") or element_of(item.where or "")) + message(item)
             texts += [text] if text not in texts else []
+    for texts in form.faults.values():
+        if (count := len(texts) - _MOST_TEXTS) > 1:
+            texts[_MOST_TEXTS:] = [
+                ngettext("and {count} further fault", "and {count} further faults", count, count=count)
+            ]
 
 
 def _beside(name: str, edited: str) -> str:

@@ -100,9 +100,10 @@ def base_of(values: Mapping[str, str], faults: Faults) -> dict[str, Any]:
             continue
         text = values.get(entry.name, "") or (entry.chosen(values) if entry.field.choices else "")
         name = entry.name.rpartition("/")[2]
-        if text.strip() or entry.item.kind in {"tick", "measured"}:
+        required = entry.field.required
+        if text.strip() or entry.item.kind in {"tick", "measured"} or (required and entry.item.kind == "table"):
             _opened(base, entry.name)[name] = _read(entry, text, faults)
-        elif entry.field.required:
+        elif required:
             _opened(base, entry.name)
     for rows in form_of(values).lists:
         count = rows_of(values, rows)

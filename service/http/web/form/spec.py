@@ -183,7 +183,8 @@ def number_or_range(name: str) -> Cell:
 def _refined_results(text: str) -> list[Any]:
     """Results that are refined, of which some have an error behind their name: ``efficiency; torque.max 0.2 N*m``."""
     found: list[Any] = []
-    for part in text.split(";"):
+    # A comma before a letter separates results, one before a digit can be decimal.
+    for part in re.split(r";|,(?=\s*[^\W\d])", text):
         own = _WITH_ERROR.fullmatch(part)
         found += names_of(part) if own is None else [{"result": own["name"], "error": plain(own["error"])}]
     return found

@@ -84,6 +84,16 @@ def test_what_cannot_be_separated_is_named(service: Service) -> None:
     assert any("follows from the residuals" in sentence for sentence in found["sentences"])
 
 
+def test_intervals_that_are_whole_ranges_are_not_too_narrow(service: Service) -> None:
+    points = "".join(f"2,{-30.0 + 0.05 * k},0.001\n" for k in range(5))
+    text = f"shaft.load,shaft.speed.mean,sigma\n{points}"
+    for unknown, narrow in ((CALIBRATE["unknown"], False), ([CALIBRATE["unknown"][1]], True)):
+        study_id = calibration(service, measured={"csv": text}, unknown=unknown)
+        first, *_ = service.get(f"/studies/{study_id}/calibration")["sentences"]
+        assert "farther off than sigma explains." in first
+        assert first.endswith(" The intervals are too narrow.") == narrow
+
+
 def test_a_sensor_that_does_not_read_zero_is_named_without_sigma(service: Service) -> None:
     """With the damping given, which acts as the offset does."""
     unknown, points = [CALIBRATE["unknown"][1]], {"csv": measured(0.8, sigma=False)}

@@ -100,6 +100,22 @@ def test_an_axis_that_is_refined_asks_for_results_and_an_error() -> None:
     assert (checked.preview["cases"], checked.preview["most_cases"]) == (64 * 17, 64 * 257)
 
 
+def test_refined_results_may_have_commas_between_them() -> None:
+    text = "shaft.speed.mean 0,5 rad/s, efficiency 1 %, torque.max"
+    assert spec_of({**values_of(REFINED), "/refine/results": text})[0]["refine"]["results"] == [
+        {"result": "shaft.speed.mean", "error": "0.5 rad/s"}, {"result": "efficiency", "error": "1 %"}, "torque.max",
+    ]  # fmt: skip
+
+
+def test_an_empty_table_says_what_to_paste() -> None:
+    checked = check_form({**values_of(REFINED), "/base/excitation/further": "measured"}, Chunking())
+    assert checked.faults == {
+        "/base/excitation/measured/csv": [
+            "is empty; allowed: headings, then at least two lines, as in angle [rad],x [m],y [m]"
+        ]
+    }
+
+
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [

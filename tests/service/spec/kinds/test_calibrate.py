@@ -158,6 +158,21 @@ def test_a_fault_of_the_measured_points_names_its_line(text: Any, code: str, wor
     assert fault.where.startswith("/calibrate/")
 
 
+def test_many_wrong_cells_of_a_column_are_one_fault() -> None:
+    with pytest.raises(SpecError) as error:
+        read("shaft.load,shaft.speed.mean\n" + "".join(f"0.1,x{k}\n" for k in range(300)) + "0.1,20\n")
+    (speed,) = error.value.faults
+    assert "line 2, column shaft.speed.mean: " in speed.message
+    assert speed.message.endswith("(and 299 further like it, in the lines 3, 4, 5, …)")
+    with pytest.raises(SpecError) as error:
+        read("shaft.load,shaft.speed.mean\n0.1\n0.2,20\n0.3\n0.4,20,1\n")
+    (uneven,) = error.value.faults
+    assert uneven.message == "line 2 has 1 cell (and 2 further like it, in the lines 4, 5)"
+    with pytest.raises(SpecError) as error:
+        read("")
+    assert "headings, then a line for each point" in str(error.value)
+
+
 @pytest.mark.parametrize(
     ("changes", "pointer", "code"),
     [
