@@ -92,6 +92,13 @@ def bare_caption(model: str, name: str, translate: Callable[[str], str] = str) -
     return translate(text).format(index, number=ordinal(index))
 
 
+def given_caption(model: str, name: str, translate: Callable[[str], str] = str) -> str:
+    """As `bare_caption`, where the model has a caption for it; "" where only a description stands for one."""
+    own, _part = _within_part(name)
+    known = {name, general_path(name), general_path(own)} & model_of(model).presentation.captions.keys()
+    return bare_caption(model, name, translate) if known else ""
+
+
 def single_parts(paths: Iterable[str]) -> frozenset[str]:
     """The kinds of numbered parts, pendulums and parts of a machine, of which these paths have just one."""
     numbers = {

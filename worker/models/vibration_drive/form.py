@@ -161,7 +161,7 @@ FORM: Final = Form(
     ),
     called="a vibration drive",
     with_run=True,
-    drawer="Clutch law, damping, phase, how long to run, further cases",
+    drawer="Clutch, damping, phase, run, further cases",
     front=(
         r"excitation\.(frequency|amplitude_[xy])",
         r"pendulums\.N\.(mass|arm|inertia|spring_rate|spring_arm|backlash)", r"shaft\.(inertia|load)",

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
-from sprag_study.service.languages import N_, _
+from sprag_study.service.languages import N_, _, gettext
 from sprag_study.service.reading.reader import Reading
 from sprag_study.service.reading.units import examples
 from sprag_study.service.reading.wording import number, words
@@ -21,6 +21,7 @@ from sprag_study.service.spec.kinds import goal, refine
 from sprag_study.worker import models
 from sprag_study.worker.models import Parameter
 from sprag_study.worker.models.form import Form
+from sprag_study.worker.models.vocabulary import given_caption
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -47,11 +48,11 @@ class Field:
     choices: tuple[tuple[str, str], ...] = ()
 
 
-def field_for(entry: Parameter, path: str) -> Field:
-    """The field of a parameter at ``path`` of the base."""
+def field_for(entry: Parameter, path: str, model: str) -> Field:
+    """The field of a parameter of ``model`` at ``path`` of the base."""
     return Field(
         name=base_pointer(path),
-        label=_(words(path.rsplit(".", maxsplit=1)[-1])),
+        label=given_caption(model, path, gettext) or _(words(path.rsplit(".", maxsplit=1)[-1])),
         symbol=entry.symbol,
         unit=entry.unit,
         help=_(entry.help),

@@ -259,7 +259,7 @@ class _Machine:
         if entry is None:
             own = Field(name, item.label, item.help)
         elif isinstance(entry, Parameter):
-            own = field_for(entry, path)
+            own = field_for(entry, path, self.model)
         else:
             own = described(entry, name.rpartition("/")[0])
             blank = (("", item.default),) if item.without else ()

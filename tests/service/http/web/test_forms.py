@@ -103,7 +103,7 @@ def test_an_axis_that_is_refined_asks_for_results_and_an_error() -> None:
 def test_refined_results_may_have_commas_between_them() -> None:
     text = "shaft.speed.mean 0,5 rad/s, efficiency 1 %, torque.max"
     assert spec_of({**values_of(REFINED), "/refine/results": text})[0]["refine"]["results"] == [
-        {"result": "shaft.speed.mean", "error": "0.5 rad/s"}, {"result": "efficiency", "error": "1 %"}, "torque.max",
+        {"result": "shaft.speed.mean", "error": "0,5 rad/s"}, {"result": "efficiency", "error": "1 %"}, "torque.max",
     ]  # fmt: skip
 
 
