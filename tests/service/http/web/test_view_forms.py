@@ -172,7 +172,7 @@ def test_every_question_about_a_study_is_answered_or_says_how(service: Service) 
         usual = service.http.get(own)
         assert f'<a href="{own}?ask={list(ASKS)[max(map(list(ASKS).index, known))]}" aria-current="page"' in usual.text
         if "measurement" not in known:
-            assert 'name="measured"' in service.http.get(f"{own}?ask=measurement").text
+            assert 'name="/calibrate/measured/csv"' in service.http.get(f"{own}?ask=measurement").text
         if "tolerances" not in known:
             assert f'href="/new?clone={study_id}"' in service.http.get(f"{own}?ask=tolerances").text
         assert service.http.get(f"{own}?ask=luck").status_code == 404
