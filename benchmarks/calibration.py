@@ -1,12 +1,12 @@
 """Do the intervals of calibrations hold the true values? Synthetic measurements of drives, with noise.
 
     python -m benchmarks.calibration [--sets COUNT] [--first SET] [--refits COUNT] [--settled] [--unknown-sigma]
-        [--priors]
+        [--few] [--priors]
 
 Each set is a drive of W1 with random damping, inertia of the pendulum, rate of its spring and backlash, whose mean
 speed and irregularity are measured with 2 % noise at five loads and three frequencies. By default its rows are those of
-runs over 60 periods. With ``--priors`` the rate of the spring is drawn from a normal distribution that the calibration
-knows, and only one frequency is measured.
+runs over 60 periods. With ``--few`` only one frequency is measured, and the rate of the spring is drawn from a normal
+distribution, which the calibration knows with ``--priors``.
 """
 
 from __future__ import annotations
@@ -75,14 +75,17 @@ class Drive:
         return Rows(points, np.asarray(endings) == ENDINGS.index(Ending.OK), named)
 
 
-def one_set(number: int, drive: Drive, refits: int, *, known: bool, prior: bool) -> tuple[Floats, CalibratePlanner]:
+def one_set(
+    number: int, drive: Drive, refits: int, *, known: bool, few: bool, prior: bool
+) -> tuple[Floats, CalibratePlanner]:
     """The true values of a set, and its calibration at the end."""
     random = np.random.default_rng(number)
     true = np.array([random.uniform(*ends) for ends in TRUE])
     at, unknown = AT, UNKNOWN
-    if prior:
+    if few:
         true[RATE] = random.normal(*PRIOR)
         at = tuple(one for one in AT if one[1] == AT[1][1])
+    if prior:
         unknown = tuple(replace(one, prior=PRIOR if place == RATE else None) for place, one in enumerate(UNKNOWN))
     exact = drive.rows(np.hstack([np.tile(true, (len(at), 1)), np.array(at)]))
     measured = []
@@ -105,13 +108,16 @@ def main() -> None:
     parser.add_argument("--refits", type=int, default=200)
     parser.add_argument("--settled", action="store_true")
     parser.add_argument("--unknown-sigma", action="store_true")
+    parser.add_argument("--few", action="store_true")
     parser.add_argument("--priors", action="store_true")
     chosen = parser.parse_args()
     drive = Drive(settled=chosen.settled)
     held, named, planning = np.zeros(len(UNKNOWN), dtype=np.int64), 0, 0.0
     for number in range(chosen.first, chosen.first + chosen.sets):
         begin, engine = time.process_time(), drive.seconds
-        true, planner = one_set(number, drive, chosen.refits, known=not chosen.unknown_sigma, prior=chosen.priors)
+        true, planner = one_set(
+            number, drive, chosen.refits, known=not chosen.unknown_sigma, few=chosen.few, prior=chosen.priors
+        )
         planning += time.process_time() - begin - (drive.seconds - engine)
         found = answer(planner.plan, planner.space, planner.state)
         if found is None or found.intervals is None:
