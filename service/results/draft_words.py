@@ -47,6 +47,7 @@ def _axis(study: Study, axis: Axis, reading: Reading) -> str:
     unit = unit_of(study, path)
     least, largest = float(values.min()), float(values.max())
     name = " = ".join(reading.within(path) for path in axis.paths)
+    name += ":" if name[-1:].isdigit() else ""  # "stage 1: 500 to 5000"
     if values.size == 1:
         return f"{name} {reading.quantity(least, unit, _DIGITS)}"
     ends = Phrase("{low} to {high}", low=Amount(least, unit, _DIGITS, bare=True), high=Amount(largest, unit, _DIGITS))

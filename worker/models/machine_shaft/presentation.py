@@ -129,7 +129,7 @@ _OF_MOTOR: Final = (
     "motor.speed.mean", "motor.torque.mean", "motor.torque.max", "motor.torque.rms", "motor.power.mean"
 )  # fmt: skip
 
-#: Of couplings: what follows the irregularity, what follows all others, and their answers.
+#: Of couplings: what follows the irregularity, what follows all others, and the answers behind that of irregularity.
 _OF_COUPLINGS: Final = ("torsion.dynamic_factor", "torsion.margin", "torsion.torque.amplitude")
 _FURTHER_OF_COUPLINGS: Final = ("torsion.natural_frequency", "torsion.reversals")
 _ANSWERS_OF_COUPLINGS: Final = (
@@ -151,6 +151,7 @@ def presentation_of(structure: Mapping[str, Any], paths: Collection[str] = ()) -
         more += ("motor.torque.margin",)
     if "coupling" in drive.get("stages", ()):
         main = (*shown.main[:1], *_OF_COUPLINGS, *shown.main[1:])
-        shown = replace(shown, main=main, answers=(*shown.answers, *_ANSWERS_OF_COUPLINGS))
+        answers = (*shown.answers[:1], *_ANSWERS_OF_COUPLINGS, *shown.answers[1:])
+        shown = replace(shown, main=main, answers=answers)
         more += _FURTHER_OF_COUPLINGS
     return replace(shown, main=shown.main + more) if more else shown

@@ -33,7 +33,7 @@ from sprag_study.service.reading.numbers import parse_number
 from sprag_study.service.reading.part_names import lower_first
 from sprag_study.service.reading.quantities import offered, preferred
 from sprag_study.service.reading.ranges import typed_range
-from sprag_study.service.reading.together import split_list, with_last_unit
+from sprag_study.service.reading.together import split_list, typed_unit, with_last_unit
 from sprag_study.service.reading.units import QuantityError, parse_quantity, plain_signs
 from sprag_study.service.reading.wording import number, unit_text
 from sprag_study.service.spec.fields import base_path, base_pointer
@@ -401,9 +401,10 @@ class _Making:
     def _span(self, row: int) -> str:
         """The values of a row in words: ``0 … 1.6 N·m``."""
         own = self._row(row)
-        unit = f" {unit_text(own.quantity.unit)}" if own.quantity.unit else ""
         texts = _several(own.quantity.text)
         ends = texts[:2] if typed_range(own.quantity.text) else [*texts[:1], *texts[1:][-1:]]
+        known = not own.quantity.unit or any(typed_unit(text) for text in ends)
+        unit = "" if known else f" {unit_text(own.quantity.unit)}"
         return " … ".join(ends or ["?"]) + unit
 
     def rows(self) -> Iterable[Row]:

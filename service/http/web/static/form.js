@@ -75,7 +75,7 @@ const check = async () => {
   for (const place of form.querySelectorAll(".wrong")) {
     const texts = (found.beside || {})[place.id.slice("wrong:".length)] || [];
     if (place.nextElementSibling?.matches(".hint")) place.nextElementSibling.remove();
-    if (texts.length) place.after(Object.assign(document.createElement("span"), { className: "hint", textContent: texts.join(" ") }));
+    if (texts.length) place.after(Object.assign(document.createElement("span"), { className: "hint", textContent: texts.join("\n") }));
   }
   const pictures = form.querySelectorAll(".picture");
   if (pictures.length === (found.pictures || []).length) pictures.forEach((place, index) => { place.innerHTML = found.pictures[index]; });
