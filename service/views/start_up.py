@@ -25,7 +25,7 @@ from sprag_study.worker.models.ramps import MOST_PERIODS, Ramps, StartUp
 
 if TYPE_CHECKING:
     from sprag_study.service.figures.figure import Figure
-    from sprag_study.worker.models import KernelShape
+    from sprag_study.worker.models import KernelShape, ResultInfo
     from sprag_study.worker.study import Study
 
 #: Largest share by which a mean speed may differ from the settled one.
@@ -120,7 +120,7 @@ class StartUpView(CaseView[StartUpQuestion, tuple[Ramps, int], StartUp]):
         if made.ending != models.OK:
             return Shown((Phrase(models.ENDING_SENTENCES[made.ending]),))
         rows = [
-            [Phrase(info.description), joined("", [Amount(value, info.unit, 6)])]
+            [_meaning(made, info), joined("", [Amount(value, info.unit, 6)])]
             for info in made.infos
             if info.name not in _unlisted(made) and math.isfinite(value := made.results[info.name])
         ]
@@ -132,6 +132,15 @@ class StartUpView(CaseView[StartUpQuestion, tuple[Ramps, int], StartUp]):
         made = answer.result
         data = {"ending": made.ending, "reached": made.reached, "results": _results(made)}
         return Said(data, made.ending == models.OK)
+
+
+def _meaning(made: StartUp, info: ResultInfo) -> Phrase:
+    """What a result means, with its pendulum where there are several."""
+    first, _dot, rest = info.name.partition(".")
+    if first != "pendulums" or "pendulums.1.torque.max" not in made.results:
+        return Phrase(info.description)
+    number = Phrase("Pendulum {number}", number=int(rest.partition(".")[0]) + 1)
+    return joined(": ", [number, Phrase(info.description)])
 
 
 def _given(question: StartUpQuestion, name: str) -> str:

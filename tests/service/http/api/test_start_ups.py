@@ -6,9 +6,19 @@ import csv
 import io
 from typing import Any
 
+import numpy as np
 import pytest
 
+from sprag_study.engine.endings import Ending
+from sprag_study.engine.outcome import Trajectory
+from sprag_study.engine.vibration_drive.start_up import start_up_infos
 from sprag_study.service.answers.start_ups import StartUp
+from sprag_study.service.presets import preset_text
+from sprag_study.service.reading.reader import Reading
+from sprag_study.service.spec.document import load_spec, parse_spec
+from sprag_study.service.views.case_view import CaseAnswer
+from sprag_study.service.views.start_up import StartUpAnswer, StartUpView
+from sprag_study.worker.models import ramps
 from tests.service.conftest import API, Service
 from tests.service.shapes import fits
 
@@ -76,3 +86,15 @@ def test_a_machine_shaft_has_none(service: Service) -> None:
     study_id = service.submit(service.get("/presets/press")["spec"])
     assert asked(service, study_id, case=0).status_code == 404
     assert "startup" not in service.get(f"/studies/{study_id}/cases/0")["links"]
+
+
+def test_results_of_several_pendulums_say_of_which() -> None:
+    motion = Trajectory(np.empty(0), (), (), np.empty((0, 0)), {}, Ending.OK)
+    infos = start_up_infos(2)
+    made = ramps.StartUp(True, "periodic", infos, {info.name: 1.0 for info in infos}, motion, Ending.OK)
+    study = parse_spec(load_spec(preset_text("two_pendulums")[1], "toml")).study
+    answer: StartUpAnswer = CaseAnswer(study, 0, (ramps.Ramps(), 20), made)
+    (table,) = StartUpView().shown(answer).tables
+    said = [Reading("vibration-drive").say(row[0]) for row in table.rows]
+    assert len(set(said)) == len(said)
+    assert "Pendulum 2: largest torque of the clutch on the way" in said
