@@ -55,11 +55,13 @@ def _check_couplings(spec: MachineSpec, row: Columns) -> None:
         last = body == len(stages)
         if inertia[0, 0, 0] > 0.0 or (last and not bare):
             continue
-        raise RelationError(
-            f"drive.stages.{stages[body - 1]}.output_inertia" if body else f"drive.stages.{stages[0]}.inertia", 0.0,
-            Sentence("is needed: nothing else turns between this coupling and the next one, or the end of the train"),
-            alone(">", amount(0.0, "kg*m^2")),
-        )  # fmt: skip
+        place = f"{stages[body - 1]}.output_inertia" if body else f"{stages[0]}.inertia"
+        why = Sentence("is needed: nothing else turns before this coupling; give the rotor of the motor here")
+        if body:
+            why = Sentence(
+                "is needed: nothing else turns between this coupling and the next one, or the end of the train"
+            )
+        raise RelationError(f"drive.stages.{place}", 0.0, why, alone(">", amount(0.0, "kg*m^2")))
 
 
 def _check_ring(row: Columns) -> None:

@@ -16,7 +16,7 @@ _BEGINNING: Final = re.compile(f"{_SIGN}|{_ZERO}")
 _BETWEEN: Final = re.compile(rf"\s*/\s*(?={_SIGN}|{_ZERO})|\s+(?=[-\u2212\u2013]|{_ZERO})")
 _RISING: Final = re.compile(rf"\+|{_ZERO}")
 #: Between a value and its tolerance.
-_BEFORE: Final = re.compile(r"\s*±\s*|\s+")
+_BEFORE: Final = re.compile(r"\s*(?:±|\+/?[-\u2212])\s*|\s+")
 
 
 def deviations(text: str) -> tuple[str, str] | None:
@@ -41,7 +41,7 @@ def deviations(text: str) -> tuple[str, str] | None:
 
 
 def with_tolerance(text: str) -> tuple[str, str] | None:
-    """The value and the tolerance of ``9 N/mm ± 10 %`` or ``30 +0.05/-0 mm``; None for any other text.
+    """The value and the tolerance of ``9 N/mm ± 10 %``, ``9 N/mm +- 10 %`` or ``30 +0.05/-0 mm``; None for other texts.
 
     A unit at the end is that of a bare value before it.
     """
@@ -49,7 +49,7 @@ def with_tolerance(text: str) -> tuple[str, str] | None:
     for gap in _BEFORE.finditer(text) if len(text) <= MAX_QUANTITY_LENGTH else ():
         value, tolerance = text[: gap.start()], text[gap.end() :]
         pair = deviations(tolerance)
-        if _unit(value) is None or not tolerance or not (pair or "±" in gap[0]):
+        if _unit(value) is None or not tolerance or not (pair or gap[0].strip()):
             continue
         if pair is None:
             value, tolerance = with_last_unit([value, tolerance])

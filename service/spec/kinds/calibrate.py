@@ -141,8 +141,13 @@ def _read_prior(node: Node, paths: Sequence[str], ends: tuple[float, float]) -> 
     if mean is not None and not low <= mean <= high:
         span = Sentence("{low} to {high}", low=Amount(low, unit, digits=6), high=Amount(high, unit, digits=6))
         node["mean"].refuse("out-of-range", "lies outside of the range of the parameter", allowed=span)
-    if sigma is not None and sigma <= 0.0:
-        node["sigma"].refuse("out-of-range", "is out of range", allowed="above 0", unit=unit)
+    most = Sentence("above 0, at most {high}", high=Amount(high - low, unit, digits=6))
+    if share and mean == 0.0:
+        node["sigma"].refuse("out-of-range", "is a share of a mean of 0", allowed=most)
+    elif sigma is not None and sigma <= 0.0:
+        node["sigma"].refuse("out-of-range", "is out of range", allowed=most)
+    elif sigma is not None and sigma > high - low:
+        node["sigma"].refuse("out-of-range", "is more than the width of the range; was it in percent?", allowed=most)
     return None if mean is None or sigma is None else (mean, sigma)
 
 

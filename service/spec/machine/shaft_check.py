@@ -124,7 +124,7 @@ def check_machine(
 def _warn_of_torsion(report: Report, results: Mapping[str, float], turns: int) -> None:
     """Warn of a harmonic of the cycle near a natural frequency of the train, and of torques that change their sign."""
     order, margin, factor = (results[f"torsion.{name}"] for name in ("order", "margin", "dynamic_factor"))
-    if margin < _NEAR_RESONANCE:
+    if margin < _NEAR_RESONANCE and factor > 1.0:
         near = Sentence(
             "harmonic {order} of the cycle, {speed}, is within {margin} of a torsional natural frequency of the train; "
             "the largest dynamic factor of its couplings is {factor}",

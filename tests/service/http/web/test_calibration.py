@@ -58,7 +58,7 @@ def test_pasted_points_become_a_study(service: Service) -> None:
     assert 'value="pendulums.0.damping"' in empty.text
     sensor = {"result": "shaft.speed.mean", "gain": "1,02", "offset": "-1 to 1 rad/s"}
     fields = filled(study_id, loss="huber", **{f"sensors/1/{name}": text for name, text in sensor.items()})
-    fields["/calibrate/unknown/0/prior"] = "0,012 ± 20 %"
+    fields["/calibrate/unknown/0/prior"] = "0,012 +- 20 %"
     sent = service.http.post("/calibrate", data=fields, follow_redirects=False)
     assert sent.status_code == 303, sent.text
     made = sent.headers["location"].rpartition("/")[2]

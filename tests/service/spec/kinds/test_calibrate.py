@@ -264,6 +264,7 @@ def test_priors_are_read_in_si_and_count_as_measured_values() -> None:
         ({"mean": 0.01}, "/sigma", "required"),
         ({"mean": 0.1, "sigma": "10 %"}, "/mean", "out-of-range"),
         ({"mean": 0.01, "sigma": 0}, "/sigma", "out-of-range"),
+        ({"mean": 0.01, "sigma": 20}, "/sigma", "out-of-range"),
         ({"mean": 0.01, "sigma": "1 mm"}, "/sigma", "wrong-unit"),
         ({"mean": 0.01, "sigma": 0.001, "kind": "normal"}, "/kind", "unknown-field"),
         ("0.01 +- 0.001", "", "wrong-type"),

@@ -255,7 +255,7 @@ def test_couplings_have_results_and_warnings() -> None:
     [
         ({"stiffness": 0}, "stiffness", "is out of range"),
         ({"relative_damping": -0.1}, "relative_damping", "is out of range"),
-        ({"inertia": 0}, "inertia", "nothing else turns between this coupling and the next one"),
+        ({"inertia": 0}, "inertia", "nothing else turns before this coupling"),
         ({"ratio": 2}, "ratio", "is not a field of a stage of the kind coupling"),
     ],
 )
