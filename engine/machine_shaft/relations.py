@@ -55,12 +55,14 @@ def _check_couplings(spec: MachineSpec, row: Columns) -> None:
         last = body == len(stages)
         if inertia[0, 0, 0] > 0.0 or (last and not bare):
             continue
-        place = f"{stages[body - 1]}.output_inertia" if body else f"{stages[0]}.inertia"
-        why = Sentence("is needed: nothing else turns before this coupling; give the rotor of the motor here")
         if body:
+            place = f"{stages[body - 1]}.output_inertia"
             why = Sentence(
                 "is needed: nothing else turns between this coupling and the next one, or the end of the train"
             )
+        else:
+            place = f"{stages[0]}.inertia"
+            why = Sentence("is needed: nothing else turns before this coupling; give the rotor of the motor here")
         raise RelationError(f"drive.stages.{place}", 0.0, why, alone(">", amount(0.0, "kg*m^2")))
 
 

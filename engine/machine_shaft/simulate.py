@@ -15,7 +15,7 @@ from sprag_study.engine.machine_shaft.decomposition import Decomposition, charac
 from sprag_study.engine.machine_shaft.drive_train import Train
 from sprag_study.engine.machine_shaft.flywheel import flywheel_results, required_inertia
 from sprag_study.engine.machine_shaft.kinks import motion_kinks
-from sprag_study.engine.machine_shaft.load_results import infos_of
+from sprag_study.engine.machine_shaft.load_results import couplings_of, infos_of
 from sprag_study.engine.machine_shaft.loads import Moving, loads, operation_factor
 from sprag_study.engine.machine_shaft.machine import Fields, Machine, check_structure
 from sprag_study.engine.machine_shaft.motor import characteristic, limit_cycle
@@ -362,7 +362,7 @@ def _block(spec: MachineSpec, columns: Columns, further: Floats | None) -> tuple
         own = columns.take(rows)
         lost = settle(spec, own, solved)
         vibrating = last & (solved.endings == _CODE[Ending.OK])
-        chain = Train.of(spec.drive, own.values).chain
+        chain = Train.of(spec.drive, own.values).chain if couplings_of(spec) else None
         solved.results.update(torsion_results(chain, solved.decomposition, solved.results, vibrating))
         for position, name in enumerate(_NAMES):
             if name != "assembly.angle":

@@ -168,6 +168,7 @@ def sampled(
         "base.displacement_y": value["excitation.amplitude_y"] * elementary.sin(phase + value["excitation.phase"]),
     }
     for harmonic in harmonics(values, 1):
+        # (m nu) t and m (nu t) differ in their last bit, and earlier motions have the first.
         turned = harmonic.order * nu * times_done if angle is None else harmonic.order * angle
         for axis, part in (
             ("x", harmonic.amplitude_x * elementary.cos(turned + harmonic.phase_x)),

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from sprag_study.service.results.calibration import Calibration
 
 
-#: Sentences about the fit and the measurement that belong to the answer at most: whether it fits, an offset, a value
-#: far off.
+#: Sentences about the fit and the measurement that belong to the answer at most, the first of: whether it fits, priors
+#: that are contradicted, an offset, values far off.
 _DOUBTS: Final = 3
 #: Probability below which a chi-square is not explained by chance.
 _CHANCE: Final = 0.01
@@ -31,9 +31,9 @@ _MOST_OF: Final = 0.9
 _OFFSET_DEVIATIONS: Final = 5.0
 #: Standard deviations from which on a point is named.
 _FAR: Final = 4.0
-#: Share of its standard deviation before, from which on a parameter is hardly known better; standard deviations beyond
-#: which measured values contradict a prior.
+#: Share of the standard deviation of its prior from which on a parameter is hardly known better.
 _NARROWER: Final = 0.8
+#: Standard deviations beyond which measured values contradict a prior.
 _CONTRADICTS: Final = 3.0
 #: Share of refits that may end before they converge without a word.
 _ENDED: Final = 0.25
